@@ -1,0 +1,40 @@
+# Two commands matter on a fresh machine: `make demo` and `make test`.
+PYTHON ?= python3
+VENV   := .venv
+BIN    := $(VENV)/bin
+
+.PHONY: demo test check lint benchmark clean
+
+demo: $(VENV)/installed
+	@$(BIN)/magcomp demo
+
+test: $(VENV)/installed-dev lint
+	@$(BIN)/python -m pytest -n 2 -q
+
+lint: $(VENV)/installed-dev
+	@$(BIN)/ruff check magcomp tests benchmarks examples
+	@$(BIN)/ruff format --check magcomp tests benchmarks examples
+	@$(BIN)/mypy
+	@$(BIN)/lint-imports
+
+check: lint
+
+benchmark: $(VENV)/installed-dev
+	@$(BIN)/python benchmarks/read_tlog.py
+
+$(VENV)/bin/python:
+	@$(PYTHON) -c 'import sys; sys.exit("magcomp needs Python 3.11 or newer") if sys.version_info < (3, 11) else None'
+	@$(PYTHON) -m venv $(VENV)
+
+$(VENV)/installed: pyproject.toml | $(VENV)/bin/python
+	@echo "Setting up magcomp in $(VENV) ..."
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e .
+	@touch $@
+
+$(VENV)/installed-dev: pyproject.toml | $(VENV)/bin/python
+	@echo "Setting up magcomp and its test tools in $(VENV) ..."
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
+	@touch $(VENV)/installed $@
+
+clean:
+	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .import_linter_cache

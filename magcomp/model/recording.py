@@ -1,0 +1,195 @@
+"""What was recorded: the same frozen tables whatever the source.
+
+Units inside magcomp are mGauss, amperes, volts, radians, seconds and throttle
+0 … 1; degrees only in a position. Time zero is the first message used.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Series:
+    """A quantity against time.
+
+    Attributes
+    ----------
+    time
+        Seconds since the recording began, shape (n,), never decreasing.
+    value
+        The quantity, shape (n,) or (n, k).
+    """
+
+    time: FloatArray
+    value: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+
+@dataclass(frozen=True)
+class Vehicle:
+    """Who made the recording.
+
+    Attributes
+    ----------
+    autopilot
+        ``"ardupilot"`` or ``"px4"``.
+    kind
+        ``"copter"``, ``"plane"``, ``"rover"``, ``"boat"``, ``"sub"`` or ``"unknown"``.
+    system, component
+        MAVLink identity of the autopilot.
+    firmware
+        Version such as ``"4.6.3"``; empty where the recording does not say.
+    device_ids
+        COMPASS_DEV_ID, COMPASS_DEV_ID2, COMPASS_DEV_ID3, in that order, as far as known and not 0.
+    """
+
+    autopilot: str
+    kind: str
+    system: int
+    component: int
+    firmware: str = ""
+    device_ids: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class ReadReport:
+    """What a reader made of its bytes.
+
+    Attributes
+    ----------
+    size
+        Bytes in the source.
+    frames
+        Whole frames found.
+    used
+        Frames decoded into the recording.
+    bad_checksum
+        Frames of the wanted messages that failed their checksum.
+    skipped
+        Bytes that belong to no frame.
+    duplicates
+        Frames dropped because the same frame stood in the log before.
+    others
+        (system, component) pairs whose messages were left out.
+    """
+
+    size: int
+    frames: int
+    used: int
+    bad_checksum: int = 0
+    skipped: int = 0
+    duplicates: int = 0
+    others: tuple[tuple[int, int], ...] = ()
+
+
+@dataclass(frozen=True)
+class ParameterChange:
+    """A parameter's value as the vehicle reported it at ``time`` (seconds)."""
+
+    time: float
+    name: str
+    value: float
+
+
+@dataclass(frozen=True)
+class ParameterHistory:
+    """Every parameter value the vehicle reported, in order of time.
+
+    A value holds from its report until the next one; the first report of a
+    name also holds before it, because ground stations ask for the list late.
+    """
+
+    changes: tuple[ParameterChange, ...] = ()
+    _by_name: Mapping[str, tuple[ParameterChange, ...]] = field(
+        init=False, repr=False, compare=False, default_factory=dict
+    )
+
+    def __post_init__(self) -> None:
+        by_name: dict[str, list[ParameterChange]] = {}
+        for change in sorted(self.changes, key=lambda c: c.time):
+            by_name.setdefault(change.name, []).append(change)
+        frozen = {name: tuple(changes) for name, changes in by_name.items()}
+        object.__setattr__(self, "_by_name", MappingProxyType(frozen))
+
+    @property
+    def names(self) -> frozenset[str]:
+        """Every name ever reported."""
+        return frozenset(self._by_name)
+
+    def of(self, name: str) -> tuple[ParameterChange, ...]:
+        """Every report of one name, oldest first; empty where there is none."""
+        return self._by_name.get(name, ())
+
+    def at(self, name: str, time: float, default: float) -> float:
+        """Value of ``name`` in force at ``time``, or ``default`` where never reported."""
+        value = default
+        for index, change in enumerate(self.of(name)):
+            if index == 0 or change.time <= time:
+                value = change.value
+        return value
+
+    def last(self, name: str, default: float) -> float:
+        """Value of ``name`` at the end of the recording."""
+        changes = self.of(name)
+        return changes[-1].value if changes else default
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """Everything of a log, or of a live link so far, that the rest of magcomp needs.
+
+    Attributes
+    ----------
+    source
+        File name or address, for people.
+    start_unix_s
+        Unix time of time zero, from the clock of whoever recorded; NaN where unknown.
+    duration_s
+        Time of the last message used.
+    field
+        Compass number (1, 2, 3: the autopilot's priority order) to the body-axes
+        field in mGauss, shape (n, 3), *as the autopilot reports it*: corrected.
+        Repeats are still in; rows whose field is exactly (0, 0, 0) are not.
+    attitude
+        Roll, pitch, yaw in radians, shape (n, 3).
+    gyro, accel
+        Body rates in rad/s and specific force in m/s², shape (n, 3), of the first IMU.
+    throttle
+        Thrust demand 0 … 1 as the autopilot reports it, shape (n,).
+    current, voltage
+        Battery instance 0 in A and V, shape (n,); absent readings are left out.
+    outputs
+        Servo outputs in microseconds, shape (n, 16); 0 where not driven.
+    position
+        Latitude and longitude in degrees, altitude above sea level in m, shape (n, 3).
+    armed
+        1 armed, 0 disarmed, shape (n,).
+    """
+
+    source: str
+    vehicle: Vehicle
+    start_unix_s: float
+    duration_s: float
+    field: Mapping[int, Series]
+    parameters: ParameterHistory
+    report: ReadReport
+    attitude: Series | None = None
+    gyro: Series | None = None
+    accel: Series | None = None
+    throttle: Series | None = None
+    current: Series | None = None
+    voltage: Series | None = None
+    outputs: Series | None = None
+    position: Series | None = None
+    armed: Series | None = None
