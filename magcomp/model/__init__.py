@@ -1,4 +1,7 @@
-"""The frozen data that travels along the road: bytes → Recording → Samples → MotorFit → Verdict → ParameterSet."""
+"""The frozen data that travels along the road.
+
+bytes → Recording → Samples → MotorFit → Verdict → ParameterSet → vehicle.
+"""
 
 from magcomp.model.parameters import ParameterSet
 from magcomp.model.recording import (

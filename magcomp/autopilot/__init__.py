@@ -1,0 +1,1 @@
+"""What each autopilot does to a compass reading, and the names of the parameters that say so."""

@@ -1,0 +1,117 @@
+"""Attitude, levelling and heading.
+
+Body axes are x forward, y right, z down; earth axes are north, east, down.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+def wrap_angle(angle: ArrayLike) -> FloatArray:
+    """Bring angles in radians into [−π, π)."""
+    return (np.asarray(angle, dtype=np.float64) + np.pi) % (2 * np.pi) - np.pi
+
+
+def level_matrix(roll: ArrayLike, pitch: ArrayLike) -> FloatArray:
+    """Rotation from body axes to level axes, C(φ,θ).
+
+    Parameters
+    ----------
+    roll, pitch
+        Radians, any common shape (...).
+
+    Returns
+    -------
+    ndarray, shape (..., 3, 3)
+
+    Notes
+    -----
+    PAPER.md equation 1.
+    """
+    roll, pitch = np.broadcast_arrays(np.asarray(roll, float), np.asarray(pitch, float))
+    sin_roll, cos_roll = np.sin(roll), np.cos(roll)
+    sin_pitch, cos_pitch = np.sin(pitch), np.cos(pitch)
+    zero = np.zeros_like(roll)
+    return np.stack(
+        [
+            np.stack([cos_pitch, sin_roll * sin_pitch, cos_roll * sin_pitch], axis=-1),
+            np.stack([zero, cos_roll, -sin_roll], axis=-1),
+            np.stack([-sin_pitch, sin_roll * cos_pitch, cos_roll * cos_pitch], axis=-1),
+        ],
+        axis=-2,
+    )
+
+
+def gravity_direction(roll: ArrayLike, pitch: ArrayLike) -> FloatArray:
+    """Unit vector pointing down, in body axes, shape (..., 3): the last row of C(φ,θ)."""
+    return level_matrix(roll, pitch)[..., 2, :]
+
+
+def body_from_earth(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> FloatArray:
+    """Rotation from north-east-down axes to body axes, shape (..., 3, 3).
+
+    Notes
+    -----
+    Level axes turned by the heading: C(φ,θ)ᵀ · R_z(ψ)ᵀ, PAPER.md equation 1.
+    """
+    yaw = np.asarray(yaw, float)
+    cos_yaw, sin_yaw = np.cos(yaw), np.sin(yaw)
+    zero, one = np.zeros_like(yaw), np.ones_like(yaw)
+    level_from_earth = np.stack(
+        [
+            np.stack([cos_yaw, sin_yaw, zero], axis=-1),
+            np.stack([-sin_yaw, cos_yaw, zero], axis=-1),
+            np.stack([zero, zero, one], axis=-1),
+        ],
+        axis=-2,
+    )
+    return np.asarray(np.swapaxes(level_matrix(roll, pitch), -1, -2) @ level_from_earth)
+
+
+def heading(
+    field: ArrayLike, roll: ArrayLike, pitch: ArrayLike, declination: float = 0.0
+) -> FloatArray:
+    """Heading of a body-axes field, radians in [−π, π).
+
+    Parameters
+    ----------
+    field
+        Field in body axes, any unit, shape (..., 3).
+    roll, pitch
+        Radians, shape (...).
+    declination
+        Radians, east positive; 0 gives the magnetic heading.
+
+    Notes
+    -----
+    PAPER.md equation 2.
+    """
+    level = np.einsum("...ij,...j->...i", level_matrix(roll, pitch), np.asarray(field, float))
+    return wrap_angle(np.arctan2(-level[..., 1], level[..., 0]) + declination)
+
+
+def heading_shift(
+    disturbance: ArrayLike, field: ArrayLike, roll: ArrayLike, pitch: ArrayLike
+) -> FloatArray:
+    """First-order change of heading that a small body-axes disturbance makes, radians.
+
+    Parameters
+    ----------
+    disturbance, field
+        Body axes, one unit for both, shape (..., 3).
+    roll, pitch
+        Radians, shape (...).
+
+    Notes
+    -----
+    PAPER.md equation 7.
+    """
+    level = level_matrix(roll, pitch)
+    shift = np.einsum("...ij,...j->...i", level, np.asarray(disturbance, float))
+    still = np.einsum("...ij,...j->...i", level, np.asarray(field, float))
+    horizontal = still[..., 0] ** 2 + still[..., 1] ** 2
+    return np.asarray((still[..., 1] * shift[..., 0] - still[..., 0] * shift[..., 1]) / horizontal)
