@@ -1,0 +1,1 @@
+"""Parameter files, and the safe way from a parameter set to a vehicle and back."""
