@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +53,8 @@ class Vehicle:
         Version such as ``"4.6.3"``; empty where the recording does not say.
     device_ids
         COMPASS_DEV_ID, COMPASS_DEV_ID2, COMPASS_DEV_ID3, in that order, as far as known and not 0.
+    board
+        Flight controller, as far as a live vehicle names it; empty where unknown.
     """
 
     autopilot: str
@@ -60,6 +63,7 @@ class Vehicle:
     component: int
     firmware: str = ""
     device_ids: tuple[int, ...] = ()
+    board: str = ""
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,53 @@
+"""The live vehicle: addresses, transports, the connection, its recorder and its replay."""
+
+from magcomp.link.address import (
+    Address,
+    Replay,
+    SerialLine,
+    SerialPort,
+    TcpClient,
+    TcpServer,
+    UdpClient,
+    UdpServer,
+    parse_address,
+    serial_ports,
+)
+from magcomp.link.connection import Connection, FrameSink, connect
+from magcomp.link.events import (
+    GapEnded,
+    GapStarted,
+    LinkEvent,
+    VehicleFound,
+    VehicleRebooted,
+)
+from magcomp.link.quality import Gap, LinkStatistics
+from magcomp.link.recorder import Recorder
+from magcomp.link.signing import read_signing_key
+from magcomp.link.streams import DEFAULT_RATES, StreamReport
+
+__all__ = [
+    "DEFAULT_RATES",
+    "Address",
+    "Connection",
+    "FrameSink",
+    "Gap",
+    "GapEnded",
+    "GapStarted",
+    "LinkEvent",
+    "LinkStatistics",
+    "Recorder",
+    "Replay",
+    "SerialLine",
+    "SerialPort",
+    "StreamReport",
+    "TcpClient",
+    "TcpServer",
+    "UdpClient",
+    "UdpServer",
+    "VehicleFound",
+    "VehicleRebooted",
+    "connect",
+    "parse_address",
+    "read_signing_key",
+    "serial_ports",
+]

@@ -1,0 +1,407 @@
+"""A live vehicle: a thread that carries bytes between a transport and the link's state."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from types import TracebackType
+from typing import Protocol, Self
+
+from magcomp.errors import InputError, LinkError, LinkTimeoutError
+from magcomp.link.address import (
+    Address,
+    SerialLine,
+    TcpClient,
+    TcpServer,
+    parse_address,
+)
+from magcomp.link.clock import Clock, SystemClock
+from magcomp.link.diagnosis import why_no_vehicle
+from magcomp.link.events import LinkEvent, SinkFailed
+from magcomp.link.framing import Message
+from magcomp.link.opening import open_transport
+from magcomp.link.quality import LinkStatistics
+from magcomp.link.state import LinkState
+from magcomp.link.streams import DEFAULT_RATES, StreamReport, affordable
+from magcomp.link.transport import ReplayEndedError, Transport, TransportClosedError
+from magcomp.model import Vehicle
+
+_POLL_S = 0.05
+_INBOX = 4096
+_EVENTS = 1000
+_REOPEN_FIRST_S = 0.1
+_REOPEN_LONGEST_S = 2.0
+_REOPEN_AFTER_SILENCE_S = 10.0
+_RESTORE_S = 3.0
+_SLOW_BAUD = 115_200
+
+
+class FrameSink(Protocol):
+    """Takes every frame as it arrives: a Recorder, a Buffer."""
+
+    def add(self, unix_us: int, frame: bytes) -> None:
+        """Take one whole frame that arrived at ``unix_us``."""
+        ...
+
+
+class Connection:
+    """One vehicle on one link. Use as a context manager, made with ``connect``.
+
+    A thread reads, keeps the link alive, and hands each frame to the sinks. When the
+    other end goes away the address is opened again until it is back.
+
+    Parameters
+    ----------
+    address
+        Where the vehicle is.
+    opener
+        Opens the transport, first now and again after each loss.
+    system
+        The vehicle to speak to; None takes the only one there is.
+    key
+        Signing key of 32 bytes; None where the link is not signed.
+    sinks
+        Take every frame that arrives, whoever sent it.
+
+    Raises
+    ------
+    LinkError
+        The address cannot be opened.
+    """
+
+    def __init__(
+        self,
+        address: Address,
+        opener: Callable[[], Transport],
+        *,
+        system: int | None = None,
+        key: bytes | None = None,
+        sinks: Sequence[FrameSink] = (),
+    ) -> None:
+        self.address = address
+        self._opener = opener
+        self._system = system
+        self._sinks = list(sinks)
+        self._transport = opener()
+        clock = self._transport.clock
+        self._state = LinkState(system=system, key=key, unix_us=clock.unix_us())
+        self._inbox: deque[Message] = deque(maxlen=_INBOX)
+        self._events: deque[LinkEvent] = deque(maxlen=_EVENTS)
+        self._changed = threading.Condition()
+        self._stop = threading.Event()
+        self._ended = False
+        self._failure: BaseException | None = None
+        self._opened_at = clock.monotonic()
+        self._reopened = 0
+        self._unsent = 0
+        self._thread = threading.Thread(target=self._run, name="magcomp-link", daemon=True)
+        self._thread.start()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    # ---------------------------------------------------------------- the vehicle
+
+    @property
+    def vehicle(self) -> Vehicle | None:
+        """The vehicle as far as known; None before its first heartbeat."""
+        with self._changed:
+            return self._state.vehicle
+
+    @property
+    def ended(self) -> bool:
+        """A replayed log is over; always False on a live link."""
+        return self._ended
+
+    def wait_vehicle(self, timeout: float = 10.0) -> Vehicle:
+        """Wait until the vehicle is found and identified.
+
+        Raises
+        ------
+        LinkTimeoutError
+            No vehicle within ``timeout`` seconds; says what arrived instead.
+        LinkError
+            Several vehicles are there and none was chosen.
+        """
+        with self._changed:
+            self._changed.wait_for(self._vehicle_clear, timeout)
+            self._raise_failure()
+            if self._state.ambiguous():
+                systems = " and ".join(
+                    f"{h.system} ({h.autopilot} {h.kind})" for h in self._state.heartbeats
+                )
+                raise LinkError(
+                    f"Several vehicles are on {self.address}, systems {systems}; "
+                    "choose one with --system."
+                )
+            vehicle = self._state.vehicle
+            if vehicle is None:
+                raise LinkTimeoutError(self._why_no_vehicle(timeout))
+            return vehicle
+
+    # ---------------------------------------------------------------- messages
+
+    def send(self, message: Message) -> None:
+        """Send a message, or lose it where the link is down at the moment, as radio does.
+
+        Raises
+        ------
+        LinkError
+            The connection was closed.
+        """
+        with self._changed:
+            if self._stop.is_set():
+                raise LinkError(f"The connection to {self.address} is closed.")
+            self._raise_failure()
+            self._write(message)
+
+    def receive(self, timeout: float) -> Message | None:
+        """Give the vehicle's next message, or None when none came within ``timeout`` seconds.
+
+        Messages of other systems and components are never given. At most 4096 wait; the
+        oldest of more are dropped.
+
+        Raises
+        ------
+        LinkError
+            The connection was closed.
+        """
+        with self._changed:
+            self._changed.wait_for(
+                lambda: self._inbox or self._ended or self._stop.is_set(), max(timeout, 0.0)
+            )
+            self._raise_failure()
+            if self._inbox:
+                return self._inbox.popleft()
+            if self._stop.is_set():
+                raise LinkError(f"The connection to {self.address} is closed.")
+            return None
+
+    def discard(self) -> None:
+        """Forget the messages that wait, so that the next ones received are new."""
+        with self._changed:
+            self._inbox.clear()
+
+    def request_streams(
+        self, rates: Mapping[str, float] = DEFAULT_RATES, timeout: float = 10.0
+    ) -> StreamReport:
+        """Ask the vehicle for message rates; given back on ``close``.
+
+        On a serial line slower than 115200 baud all rates are lowered alike until they fit.
+
+        Parameters
+        ----------
+        rates
+            Message name to Hz.
+        timeout
+            Seconds to wait for the answers; asking goes on after that.
+
+        Returns
+        -------
+        StreamReport
+            How each was answered; what really comes is in ``statistics().rates``.
+
+        Raises
+        ------
+        LinkTimeoutError
+            No vehicle has been found yet.
+        """
+        address = self.address
+        if isinstance(address, SerialLine) and address.baud < _SLOW_BAUD:
+            rates = affordable(rates, address.baud / 10)
+        with self._changed:
+            self._state.request_streams(rates, self._now())
+            report = self._state.stream_report
+            if report is None:
+                raise LinkTimeoutError(self._why_no_vehicle(0.0))
+            self._changed.wait_for(self._streams_idle, timeout)
+            self._raise_failure()
+            return self._state.stream_report or report
+
+    # ---------------------------------------------------------------- how it goes
+
+    def statistics(self) -> LinkStatistics:
+        """Losses, rates, round trip and gaps up to now."""
+        with self._changed:
+            return self._state.statistics(self._now(), reopened=self._reopened, unsent=self._unsent)
+
+    def take_events(self) -> tuple[LinkEvent, ...]:
+        """What happened since the last call, oldest first."""
+        with self._changed:
+            events = tuple(self._events)
+            self._events.clear()
+            return events
+
+    def close(self) -> None:
+        """Restore the message rates and close the transport. Closing twice is harmless."""
+        if not self._stop.is_set():
+            with self._changed:
+                if self._state.stream_report is not None and not self._state.in_gap:
+                    self._state.restore_streams()
+                    self._changed.wait_for(self._streams_idle, _RESTORE_S)
+            self._stop.set()
+        self._thread.join()
+        self._transport.close()
+        with self._changed:
+            self._changed.notify_all()
+
+    # ---------------------------------------------------------------- the thread
+
+    def _run(self) -> None:
+        try:
+            while not self._stop.is_set():
+                self._step()
+        except ReplayEndedError:
+            pass
+        except Exception as error:  # whatever it is, the caller's thread must hear of it
+            self._failure = error
+        with self._changed:
+            self._ended = True
+            self._changed.notify_all()
+
+    def _step(self) -> None:
+        try:
+            data = self._transport.read(_POLL_S)
+            self._pump(data)
+        except TransportClosedError as error:
+            self._reopen(str(error))
+            return
+        if self._stalled():
+            self._reopen("silence")
+
+    def _pump(self, data: bytes) -> None:
+        with self._changed:
+            now, unix_us = self._now(), self._transport.clock.unix_us()
+            for received in self._state.receive(data, now):
+                self._feed_sinks(unix_us, received.frame.raw)
+                if received.from_vehicle:
+                    self._inbox.append(received.frame.message)
+            for message in self._state.due(now):
+                self._write(message)
+            self._events.extend(self._state.take_events())
+            self._changed.notify_all()
+
+    def _feed_sinks(self, unix_us: int, raw: bytes) -> None:
+        for sink in tuple(self._sinks):
+            try:
+                sink.add(unix_us, raw)
+            except InputError as error:
+                self._sinks.remove(sink)
+                self._events.append(SinkFailed(self._now(), error))
+
+    def _write(self, message: Message) -> None:
+        raw = self._state.pack(message, self._transport.clock.unix_us())
+        try:
+            self._transport.write(raw)
+        except TransportClosedError:
+            self._unsent += 1  # the reading thread notices and opens it again
+
+    def _stalled(self) -> bool:
+        """Tell whether a connected transport may be dead without knowing it."""
+        if not isinstance(self.address, TcpClient | TcpServer | SerialLine):
+            return False
+        now = self._now()
+        quiet = min(self._state.silent_for(now), now - self._opened_at)
+        return self._state.vehicle is not None and quiet > _REOPEN_AFTER_SILENCE_S
+
+    def _reopen(self, reason: str) -> None:
+        with self._changed:
+            self._state.closed(self._now(), reason)
+            self._events.extend(self._state.take_events())
+            self._changed.notify_all()
+        self._transport.close()
+        delay = _REOPEN_FIRST_S
+        while not self._stop.wait(delay):
+            try:
+                transport = self._opener()
+            except LinkError:
+                delay = min(2 * delay, _REOPEN_LONGEST_S)
+                continue
+            with self._changed:
+                self._transport = transport
+                self._reopened += 1
+                self._opened_at = self._now()
+                self._state.reopened(self._now())
+            return
+
+    # ---------------------------------------------------------------- inside
+
+    def _now(self) -> float:
+        return self._transport.clock.monotonic()
+
+    def _vehicle_clear(self) -> bool:
+        now = self._now()
+        found = self._state.settled(now) and (
+            self._state.ambiguous() or self._state.identified(now)
+        )
+        return found or self._ended
+
+    def _streams_idle(self) -> bool:
+        report = self._state.stream_report
+        return report is None or report.complete or self._ended
+
+    def _why_no_vehicle(self, seconds: float) -> str:
+        return why_no_vehicle(
+            str(self.address),
+            seconds,
+            self._state.statistics(self._now()),
+            self._state.heartbeats,
+            self._state.foreign,
+            system=self._system,
+            baud=self.address.baud if isinstance(self.address, SerialLine) else None,
+        )
+
+    def _raise_failure(self) -> None:
+        if self._failure is not None:
+            raise LinkError(f"The link to {self.address} failed.") from self._failure
+
+
+def connect(
+    address: str | Address,
+    *,
+    baud: int | None = None,
+    system: int | None = None,
+    key: bytes | None = None,
+    sinks: Sequence[FrameSink] = (),
+    clock: Clock | None = None,
+) -> Connection:
+    """Open an address and start to listen.
+
+    Parameters
+    ----------
+    address
+        A connection string as in ``magcomp.link.address``, or what it was parsed into.
+    baud
+        For a serial port whose address does not say.
+    system
+        The vehicle to speak to; None takes the only one there is.
+    key
+        Signing key of 32 bytes, from ``read_signing_key``.
+    sinks
+        Recorders and buffers; the caller closes them.
+    clock
+        The computer's clocks unless given.
+
+    Raises
+    ------
+    AddressError
+        ``address`` is not a connection string.
+    LinkError
+        It cannot be opened.
+    LogError
+        It is a log to replay, and is none.
+    """
+    where = parse_address(address, baud=baud) if isinstance(address, str) else address
+    time = clock or SystemClock()
+    return Connection(
+        where, lambda: open_transport(where, time), system=system, key=key, sinks=sinks
+    )

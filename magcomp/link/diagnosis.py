@@ -1,0 +1,57 @@
+"""Why no vehicle was found, in one sentence, from what arrived instead."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from magcomp.link.identity import Heartbeat
+from magcomp.link.quality import LinkStatistics
+
+_NAMES_SHOWN = 4
+
+
+def why_no_vehicle(
+    address: str,
+    seconds: float,
+    statistics: LinkStatistics,
+    heartbeats: Sequence[Heartbeat],
+    foreign: Mapping[str, int],
+    *,
+    system: int | None = None,
+    baud: int | None = None,
+) -> str:
+    """Explain a silence.
+
+    Parameters
+    ----------
+    address, seconds
+        Where, and for how long, a heartbeat was waited for.
+    statistics, heartbeats, foreign
+        What arrived: counts, autopilots, and names of messages from anyone else.
+    system
+        The vehicle that was asked for, if one was.
+    baud
+        The line's speed, where it has one.
+    """
+    start = f"No heartbeat of a vehicle arrived at {address} within {seconds:g} s: "
+    if statistics.bytes_received == 0:
+        return start + "nothing arrived at all; check the power, the cable and the address."
+    if heartbeats and system is not None:
+        heard = ", ".join(str(number) for number in sorted({h.system for h in heartbeats}))
+        return start + f"system {system} must be on the link; instead heard system {heard}."
+    if statistics.refused > statistics.frames:
+        return start + (
+            f"{statistics.refused} frames arrived, but none is signed with the key given."
+        )
+    if statistics.skipped > statistics.bytes_received // 2 or statistics.frames == 0:
+        hint = (
+            "what speaks there does not speak MAVLink"
+            if baud is None
+            else f"the baud rate {baud} is probably wrong (radios use 57600, USB does not care)"
+        )
+        return start + f"{statistics.bytes_received} bytes arrived but no MAVLink frames; {hint}."
+    names = sorted(foreign, key=lambda name: -foreign[name])[:_NAMES_SHOWN]
+    return start + (
+        f"{statistics.frames} frames arrived, but none from an ArduPilot or PX4 autopilot "
+        f"(only {', '.join(names)})."
+    )

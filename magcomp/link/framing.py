@@ -1,0 +1,191 @@
+"""Bytes to MAVLink frames and back. No input or output happens here.
+
+Rules
+-----
+1. A frame counts only when its checksum is right. Where it is not, the search goes on
+   one byte later, so a false marker never swallows a good frame.
+2. A frame of a message that the dialect does not have cannot be checked. It is
+   taken only where another frame, or nothing, follows it directly.
+3. With a signing key, what is not signed with it is refused and counted.
+4. A frame that does not complete within a second was a false marker.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from magcomp.link.signing import (
+    SIGNATURE_LENGTH,
+    SignatureCheck,
+    is_signed,
+    signing_timestamp,
+)
+
+Message = Any
+"""A pymavlink message object of the dialect ardupilotmega, MAVLink 2."""
+
+GROUND_STATION_SYSTEM = 255
+GROUND_STATION_COMPONENT = 190  # MAV_COMP_ID_MISSIONPLANNER, as ground stations announce themselves
+
+_V1, _V2 = 0xFE, 0xFD
+_SIGNED_FLAG = 0x01
+_PATIENCE_S = 1.0
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One whole frame as it arrived, and its meaning."""
+
+    raw: bytes
+    message: Message
+
+    @property
+    def source(self) -> tuple[int, int]:
+        """System and component that sent it."""
+        if self.raw[0] == _V1:
+            return self.raw[3], self.raw[4]
+        return self.raw[5], self.raw[6]
+
+    @property
+    def sequence(self) -> int:
+        """The sender's running number, modulo 256."""
+        return self.raw[2] if self.raw[0] == _V1 else self.raw[4]
+
+
+@dataclass
+class FrameCounts:
+    """What the bytes so far were made of.
+
+    Attributes
+    ----------
+    received
+        Bytes received.
+    frames, signed
+        Frames taken, and how many of them carried a signature.
+    refused
+        Sound frames without the key's signature.
+    skipped
+        Bytes that belong to no frame.
+    """
+
+    received: int = 0
+    frames: int = 0
+    signed: int = 0
+    refused: int = 0
+    skipped: int = 0
+
+
+class Framer:
+    """Both directions of one link.
+
+    Parameters
+    ----------
+    key
+        Signing key of 32 bytes; None leaves signatures unread and signs nothing.
+    unix_us
+        Calendar time, where the signature's time starts.
+    """
+
+    def __init__(self, key: bytes | None = None, unix_us: int = 0) -> None:
+        self.counts = FrameCounts()
+        self._check = None if key is None else SignatureCheck(key, unix_us)
+        self._codec = mavlink.MAVLink(None, GROUND_STATION_SYSTEM, GROUND_STATION_COMPONENT)
+        self._pending = bytearray()
+        self._pending_since = 0.0
+        if key is not None:
+            # Only for sending: the codec without a key decodes what the check has yet to judge.
+            self._signer = mavlink.MAVLink(None, GROUND_STATION_SYSTEM, GROUND_STATION_COMPONENT)
+            self._signer.signing.secret_key = key
+            self._signer.signing.sign_outgoing = True
+        else:
+            self._signer = self._codec
+
+    def reset(self) -> None:
+        """Forget half a frame, because the bytes that come next are from another connection."""
+        self.counts.skipped += len(self._pending)
+        self._pending.clear()
+
+    def receive(self, data: bytes, now: float) -> list[Frame]:
+        """Find the frames that ``data`` completes."""
+        self.counts.received += len(data)
+        overdue = bool(self._pending) and now - self._pending_since > _PATIENCE_S
+        before = len(self._pending)
+        self._pending += data
+        frames, position = self._scan(1 if overdue else 0)
+        if overdue:
+            self.counts.skipped += 1
+        del self._pending[:position]
+        if position > 0 or before == 0:
+            self._pending_since = now
+        return frames
+
+    def pack(self, message: Message, unix_us: int) -> bytes:
+        """Put a message into a frame of the ground station, signed where there is a key."""
+        if self._check is not None:
+            signing = self._signer.signing
+            signing.timestamp = max(
+                signing.timestamp, self._check.newest, signing_timestamp(unix_us)
+            )
+        raw: bytes = message.pack(self._signer)
+        self._signer.seq = (self._signer.seq + 1) % 256
+        return raw
+
+    def _scan(self, position: int) -> tuple[list[Frame], int]:
+        """Frames found from ``position`` on, and where the first unfinished one starts."""
+        pending = self._pending
+        frames: list[Frame] = []
+        while True:
+            start = _next_marker(pending, position)
+            self.counts.skipped += start - position
+            length = _frame_length(pending, start)
+            if length is None or start + length > len(pending):
+                return frames, start
+            frame = self._decode(start, length) if length else None
+            if frame is None:
+                self.counts.skipped += 1
+                position = start + 1
+                continue
+            position = start + length
+            if self._admit(frame):
+                frames.append(frame)
+
+    def _decode(self, start: int, length: int) -> Frame | None:
+        raw = self._pending[start : start + length]
+        try:
+            message = self._codec.decode(raw)
+        except mavlink.MAVError:
+            return None
+        if isinstance(message, mavlink.MAVLink_unknown):
+            after = self._pending[start + length : start + length + 1]
+            if after and after[0] not in (_V1, _V2):
+                return None
+        return Frame(bytes(raw), message)
+
+    def _admit(self, frame: Frame) -> bool:
+        if self._check is not None and not self._check.accepts(frame.raw):
+            self.counts.refused += 1
+            return False
+        self.counts.frames += 1
+        self.counts.signed += is_signed(frame.raw)
+        return True
+
+
+def _next_marker(data: bytearray, position: int) -> int:
+    """Index of the next byte that can begin a frame, or the end."""
+    found = [index for index in (data.find(_V1, position), data.find(_V2, position)) if index >= 0]
+    return min(found, default=len(data))
+
+
+def _frame_length(data: bytearray, start: int) -> int | None:
+    """Length of the frame whose marker is at ``start``; None while unknown, 0 where it is none."""
+    if len(data) - start < 3:
+        return None
+    if data[start] == _V1:
+        return data[start + 1] + 8
+    flags = data[start + 2]
+    if flags & ~_SIGNED_FLAG:
+        return 0
+    return data[start + 1] + 12 + (SIGNATURE_LENGTH if flags else 0)

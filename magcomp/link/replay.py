@@ -1,0 +1,121 @@
+"""A .tlog played back as if a vehicle were there: a transport that cannot be answered."""
+
+from __future__ import annotations
+
+import mmap
+import struct
+import threading
+from collections.abc import Iterator
+
+from magcomp.errors import LogError
+from magcomp.link.address import Replay
+from magcomp.link.clock import Clock
+from magcomp.link.transport import ReplayEndedError
+
+_STAMP = struct.Struct(">Q")
+_MARKERS = (0xFE, 0xFD)
+_LONGEST_PAUSE_S = 5.0
+_YEAR_2000_US = 946_684_800_000_000
+_YEAR_2100_US = 4_102_444_800_000_000
+
+
+class ReplayTransport:
+    """Gives a log's frames at the pace they were recorded, times ``address.speed``.
+
+    Pauses of the log longer than five seconds are cut to five. Its clock shows the
+    log's time, so that what is recorded from a replay has the log's stamps.
+
+    Parameters
+    ----------
+    address
+        The log and the speed.
+    clock
+        What the pace is measured with.
+
+    Raises
+    ------
+    LogError
+        The file cannot be read, or holds no frame.
+    """
+
+    answers = False
+
+    def __init__(self, address: Replay, clock: Clock) -> None:
+        self.clock: Clock = self
+        self._pace = clock
+        self._speed = address.speed
+        self._closed = threading.Event()
+        self._records = records(_read(address))
+        self._next = next(self._records, None)
+        if self._next is None:
+            raise LogError(f"{address.path} must be a .tlog; it holds no MAVLink frame.")
+        self._stamp_us = self._next[0]
+        self._elapsed = 0.0
+        self._due = clock.monotonic()
+
+    def monotonic(self) -> float:
+        """Seconds of log played so far, long pauses cut."""
+        return self._elapsed
+
+    def unix_us(self) -> int:
+        """Stamp of the frame last given."""
+        return self._stamp_us
+
+    def read(self, timeout: float) -> bytes:
+        """See Transport.read; gives one record at a time."""
+        if self._next is None or self._closed.is_set():
+            raise ReplayEndedError("The replayed log is over.")
+        stamp_us, frame = self._next
+        step = min(max(stamp_us - self._stamp_us, 0) * 1e-6, _LONGEST_PAUSE_S)
+        wait = self._due + step / self._speed - self._pace.monotonic()
+        if wait > timeout:
+            self._closed.wait(timeout)
+            return b""
+        if wait > 0:
+            self._closed.wait(wait)
+        self._due += step / self._speed
+        self._elapsed += step
+        self._stamp_us = stamp_us
+        self._next = next(self._records, None)
+        return frame
+
+    def write(self, data: bytes) -> None:
+        """See Transport.write: a log takes no answer."""
+
+    def close(self) -> None:
+        """See Transport.close."""
+        self._closed.set()
+
+
+def records(data: bytes | mmap.mmap) -> Iterator[tuple[int, bytes]]:
+    """Stamps in µs and whole frames of a .tlog's bytes; what is neither is passed over."""
+    position = 0
+    while position + 11 <= len(data):
+        (stamp,) = _STAMP.unpack_from(data, position)
+        length = _length(data, position + 8)
+        if length and _YEAR_2000_US < stamp < _YEAR_2100_US:
+            if position + 8 + length > len(data):
+                return
+            yield stamp, bytes(data[position + 8 : position + 8 + length])
+            position += 8 + length
+        else:
+            position += 1
+
+
+def _length(data: bytes | mmap.mmap, start: int) -> int:
+    marker, payload, flags = data[start], data[start + 1], data[start + 2]
+    if marker not in _MARKERS:
+        return 0
+    if marker == _MARKERS[0]:
+        return payload + 8
+    return payload + 12 + (13 if flags & 1 else 0)
+
+
+def _read(address: Replay) -> bytes | mmap.mmap:
+    try:
+        with address.path.open("rb") as file:
+            return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+    except OSError as error:
+        raise LogError(f"{address.path} cannot be read: {error.strerror}.") from error
+    except ValueError as error:
+        raise LogError(f"{address.path} must be a .tlog; it is empty.") from error

@@ -1,0 +1,320 @@
+"""A ground station's side of one MAVLink link. No input or output happens here.
+
+Bytes and times go in; frames, events, statistics and messages to send come out.
+
+Rules
+-----
+1. Only these are ever sent on its own account: HEARTBEAT each second, TIMESYNC, questions
+   for identity (PARAM_REQUEST_READ, MAV_CMD_REQUEST_MESSAGE), and stream rates where
+   they were asked for. Never a PARAM_SET.
+2. The first autopilot heard is the vehicle, unless another was chosen. A second one within
+   the settling time makes the link ambiguous, and only who chooses gets on.
+3. A frame is the vehicle's when system *and* component are its own.
+4. Three seconds without a frame of the vehicle are a gap, dated from the last one.
+5. A vehicle whose clock runs back by more than two seconds, three messages in a row, rebooted.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from magcomp.link.events import GapEnded, GapStarted, LinkEvent, VehicleFound, VehicleRebooted
+from magcomp.link.framing import Frame, Framer, Message
+from magcomp.link.identity import Heartbeat, Identification, read_heartbeat
+from magcomp.link.quality import Gap, LinkStatistics, RateMeter, SequenceCounter
+from magcomp.link.streams import StreamControl, StreamReport
+from magcomp.model import Vehicle
+
+HEARTBEAT_S = 1.0
+TIMESYNC_S = 2.0
+SILENCE_S = 3.0
+SETTLING_S = 1.5
+"""Other vehicles send heartbeats each second: by then they would have been heard."""
+
+_CLOCK_BACK_MS = 2000
+_CLOCK_BACK_TIMES = 3
+_OUTSTANDING = 16
+_FOREIGN_NAMES = 50
+
+
+@dataclass(frozen=True)
+class Received:
+    """A frame that arrived, and whether it is the vehicle's."""
+
+    frame: Frame
+    from_vehicle: bool
+
+
+class LinkState:
+    """Everything a link knows.
+
+    Parameters
+    ----------
+    system
+        The vehicle to speak to; None takes the only one there is.
+    key
+        Signing key, 32 bytes; None where frames are not signed.
+    unix_us
+        Calendar time of the start, for signatures.
+    """
+
+    def __init__(self, *, system: int | None = None, key: bytes | None = None, unix_us: int = 0):
+        self._framer = Framer(key, unix_us)
+        self._wanted_system = system
+        self._heartbeats: dict[tuple[int, int], Heartbeat] = {}
+        self._foreign: dict[str, int] = {}
+        self._vehicle: tuple[int, int] | None = None
+        self._found_at = math.inf
+        self._announced = False
+        self._identification: Identification | None = None
+        self._streams: StreamControl | None = None
+        self._sequence = SequenceCounter()
+        self._meter = RateMeter()
+        self._last_heard = -math.inf
+        self._gaps: list[Gap] = []
+        self._round_trip_s = math.nan
+        self._asked_at: dict[int, float] = {}
+        self._boot_ms = -math.inf
+        self._boot_suspects = 0
+        self._next_heartbeat = -math.inf
+        self._next_timesync = -math.inf
+        self._events: list[LinkEvent] = []
+
+    # ---------------------------------------------------------------- what is known
+
+    @property
+    def vehicle(self) -> Vehicle | None:
+        """The vehicle as far as known; None before its first heartbeat."""
+        return self._identification.vehicle if self._identification else None
+
+    @property
+    def heartbeats(self) -> tuple[Heartbeat, ...]:
+        """Every autopilot heard, in order of system and component."""
+        return tuple(self._heartbeats[source] for source in sorted(self._heartbeats))
+
+    @property
+    def foreign(self) -> Mapping[str, int]:
+        """Message names that came from no autopilot, and how often."""
+        return self._foreign
+
+    @property
+    def stream_report(self) -> StreamReport | None:
+        """How the rates asked for were answered; None where none were."""
+        return self._streams.report if self._streams else None
+
+    def settled(self, now: float) -> bool:
+        """Tell whether a second vehicle would have been heard by now."""
+        if self._vehicle is None:
+            return False
+        return self._wanted_system is not None or now >= self._found_at + SETTLING_S
+
+    def ambiguous(self) -> bool:
+        """Tell whether several vehicles are there and none was chosen."""
+        return self._wanted_system is None and len(self._heartbeats) > 1
+
+    def identified(self, now: float) -> bool:
+        """Tell whether the vehicle's identity is known, or asking further is hopeless."""
+        return self._identification is not None and self._identification.complete(now)
+
+    @property
+    def in_gap(self) -> bool:
+        """The vehicle is not heard at present."""
+        return bool(self._gaps) and self._gaps[-1].end == math.inf
+
+    def silent_for(self, now: float) -> float:
+        """Seconds since the vehicle was last heard."""
+        return now - self._last_heard
+
+    def statistics(self, now: float, *, reopened: int = 0, unsent: int = 0) -> LinkStatistics:
+        """The link as it stands."""
+        counts = self._framer.counts
+        return LinkStatistics(
+            up=self._vehicle is not None and not self.in_gap,
+            bytes_received=counts.received,
+            frames=counts.frames,
+            skipped=counts.skipped,
+            refused=counts.refused,
+            signed=counts.signed,
+            lost=self._sequence.lost,
+            loss=self._meter.loss(now),
+            round_trip_s=self._round_trip_s,
+            rates=self._meter.rates(now),
+            gaps=tuple(self._gaps),
+            reopened=reopened,
+            unsent=unsent,
+        )
+
+    def take_events(self) -> list[LinkEvent]:
+        """What happened since the last call."""
+        events, self._events = self._events, []
+        return events
+
+    # ---------------------------------------------------------------- what goes in
+
+    def receive(self, data: bytes, now: float) -> list[Received]:
+        """Take bytes as they arrived; gives the frames they complete."""
+        return [self._take(frame, now) for frame in self._framer.receive(data, now)]
+
+    def reopened(self, now: float) -> None:
+        """The transport was opened again: what comes next continues nothing."""
+        self._framer.reset()
+        self._sequence.restart()
+        self._next_heartbeat = now
+        if self._streams is not None:
+            self._streams.repeat()
+
+    def closed(self, now: float, reason: str) -> None:
+        """The transport was lost: the gap begins at the last frame heard."""
+        if self._vehicle is not None and not self.in_gap:
+            self._open_gap(now, reason)
+
+    def request_streams(self, rates: Mapping[str, float], now: float) -> None:
+        """Want message rates, in Hz by name, now and after each reboot.
+
+        Raises
+        ------
+        KeyError
+            A name magcomp does not stream.
+        """
+        if self._vehicle is not None:
+            self._streams = self._streams or StreamControl(self._vehicle)
+            self._streams.request(rates, self._meter.rates(now))
+
+    def restore_streams(self) -> None:
+        """Give the vehicle its previous rates back."""
+        if self._streams is not None:
+            self._streams.restore()
+
+    # ---------------------------------------------------------------- what goes out
+
+    def due(self, now: float) -> list[Message]:
+        """Messages to send now; call at least every tenth of a second."""
+        if self._vehicle is not None and not self.in_gap and self.silent_for(now) > SILENCE_S:
+            self._open_gap(now, "silence")
+        out: list[Message] = []
+        if now >= self._next_heartbeat:
+            self._next_heartbeat = now + HEARTBEAT_S
+            out.append(_heartbeat())
+        if self._vehicle is None or self.ambiguous():
+            return out
+        self._announce(now)
+        if not self.in_gap:
+            out += self._questions(now)
+        return out
+
+    def pack(self, message: Message, unix_us: int) -> bytes:
+        """Put a message into the next frame of this ground station."""
+        return self._framer.pack(message, unix_us)
+
+    # ---------------------------------------------------------------- inside
+
+    def _questions(self, now: float) -> list[Message]:
+        out: list[Message] = []
+        if self._identification is not None:
+            out += self._identification.due(now)
+        if self._streams is not None:
+            out += self._streams.due(now)
+        if now >= self._next_timesync:
+            self._next_timesync = now + TIMESYNC_S
+            stamp = max(1, round(now * 1e9))
+            self._asked_at[stamp] = now
+            while len(self._asked_at) > _OUTSTANDING:
+                del self._asked_at[next(iter(self._asked_at))]
+            out.append(mavlink.MAVLink_timesync_message(0, stamp))
+        return out
+
+    def _take(self, frame: Frame, now: float) -> Received:
+        message = frame.message
+        if message.get_type() == "HEARTBEAT":
+            self._take_heartbeat(message, now)
+        if frame.source != self._vehicle:
+            if frame.source not in self._heartbeats:
+                self._count_foreign(message.get_type())
+            return Received(frame, from_vehicle=False)
+        self._close_gap(now)
+        lost = self._sequence.heard(frame.sequence)
+        self._meter.heard(message.get_type(), lost, now)
+        self._last_heard = now
+        self._watch_clock(message, now)
+        if message.get_type() == "TIMESYNC":
+            self._take_timesync(message, now)
+        if self._identification is not None:
+            self._identification.heard(message)
+        if self._streams is not None:
+            self._streams.heard(message)
+        return Received(frame, from_vehicle=not self.ambiguous())
+
+    def _take_heartbeat(self, message: Message, now: float) -> None:
+        heartbeat = read_heartbeat(message)
+        if heartbeat is None:
+            return
+        source = (heartbeat.system, heartbeat.component)
+        if self.settled(now) and source != self._vehicle:
+            return  # a vehicle that joins later is not ours and does not make the link ambiguous
+        self._heartbeats[source] = heartbeat
+        if self._vehicle is None and self._wanted_system in (None, heartbeat.system):
+            self._vehicle = source
+            self._found_at = now
+            self._last_heard = now
+            self._identification = Identification(heartbeat)
+
+    def _count_foreign(self, name: str) -> None:
+        if name in self._foreign or len(self._foreign) < _FOREIGN_NAMES:
+            self._foreign[name] = self._foreign.get(name, 0) + 1
+
+    def _announce(self, now: float) -> None:
+        vehicle = self.vehicle
+        if self._announced or vehicle is None:
+            return
+        if self.settled(now) and self.identified(now):
+            self._announced = True
+            self._events.append(VehicleFound(now, vehicle))
+
+    def _take_timesync(self, message: Message, now: float) -> None:
+        asked = self._asked_at.pop(message.ts1, None) if message.tc1 != 0 else None
+        if asked is not None:
+            self._round_trip_s = now - asked
+
+    def _watch_clock(self, message: Message, now: float) -> None:
+        boot_ms = getattr(message, "time_boot_ms", None)
+        if boot_ms is None:
+            return
+        if boot_ms >= self._boot_ms - _CLOCK_BACK_MS:
+            self._boot_suspects = 0
+            self._boot_ms = max(self._boot_ms, boot_ms)
+            return
+        self._boot_suspects += 1
+        if self._boot_suspects >= _CLOCK_BACK_TIMES:
+            self._boot_suspects = 0
+            self._boot_ms = boot_ms
+            self._sequence.restart()
+            self._events.append(VehicleRebooted(now))
+            if self._streams is not None:
+                self._streams.repeat()
+
+    def _open_gap(self, now: float, reason: str) -> None:
+        start = min(self._last_heard, now)
+        self._gaps.append(Gap(start))
+        self._events.append(GapStarted(start, reason))
+
+    def _close_gap(self, now: float) -> None:
+        if self.in_gap:
+            gap = Gap(self._gaps[-1].start, now)
+            self._gaps[-1] = gap
+            self._sequence.restart()
+            self._events.append(GapEnded(now, gap.duration))
+
+
+def _heartbeat() -> Message:
+    return mavlink.MAVLink_heartbeat_message(
+        mavlink.MAV_TYPE_GCS,
+        mavlink.MAV_AUTOPILOT_INVALID,
+        0,
+        0,
+        mavlink.MAV_STATE_ACTIVE,
+        3,
+    )

@@ -1,0 +1,92 @@
+"""MAVLink over UDP, listening (udp:, udpin:) or speaking first (udpout:)."""
+
+from __future__ import annotations
+
+import errno
+import socket
+
+from magcomp.link.address import UdpClient, UdpServer
+from magcomp.link.clock import Clock
+from magcomp.link.sockets import cannot_open, resolve, wait_readable
+from magcomp.link.transport import TransportClosedError
+
+_DATAGRAM = 65_535
+_PEER_SILENCE_S = 10.0
+_RECEIVE_BUFFER = 1 << 20
+
+
+class UdpTransport:
+    """A UDP socket that answers whoever spoke within the last ten seconds.
+
+    Several peers are normal: two vehicles, or a vehicle that came back on
+    another port after a reboot. The latest is answered even when silent for longer.
+
+    Raises
+    ------
+    LinkError
+        The port is in use, or the host cannot be found.
+    """
+
+    answers = True
+
+    def __init__(self, address: UdpServer | UdpClient, clock: Clock) -> None:
+        self.clock = clock
+        self._peers: dict[tuple[object, ...], float] = {}
+        self._listening = isinstance(address, UdpServer)
+        family, target = resolve(address, socket.SOCK_DGRAM)
+        self._socket = socket.socket(family, socket.SOCK_DGRAM)
+        try:
+            self._socket.setblocking(False)
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER)
+            if self._listening:
+                self._socket.bind(target)
+            else:
+                self._socket.connect(target)
+        except OSError as error:
+            self._socket.close()
+            raise cannot_open(address, error) from error
+
+    @property
+    def port(self) -> int:
+        """The local port, as the system gave it."""
+        return int(self._socket.getsockname()[1])
+
+    def read(self, timeout: float) -> bytes:
+        """See Transport.read."""
+        wait_readable(self._socket, timeout)
+        data = bytearray()
+        while len(data) < _DATAGRAM:
+            try:
+                datagram, peer = self._socket.recvfrom(_DATAGRAM)
+            except BlockingIOError:
+                break
+            except (ConnectionRefusedError, ConnectionResetError):
+                continue  # an earlier datagram of ours found nobody listening yet
+            except OSError as error:
+                raise TransportClosedError(f"The UDP socket failed: {error.strerror}.") from error
+            data += datagram
+            if self._listening:
+                self._peers.pop(peer, None)
+                self._peers[peer] = self.clock.monotonic()
+        return bytes(data)
+
+    def write(self, data: bytes) -> None:
+        """See Transport.write."""
+        try:
+            if not self._listening:
+                self._socket.send(data)
+                return
+            recent = self.clock.monotonic() - _PEER_SILENCE_S
+            for index, (peer, heard) in enumerate(reversed(list(self._peers.items()))):
+                if index == 0 or heard >= recent:
+                    self._socket.sendto(data, peer)
+        except (BlockingIOError, ConnectionRefusedError, ConnectionResetError):
+            return  # lost on the way, as on the air
+        except OSError as error:
+            if error.errno in (errno.ENETUNREACH, errno.EHOSTUNREACH, errno.ENETDOWN):
+                return
+            raise TransportClosedError(f"The UDP socket failed: {error.strerror}.") from error
+
+    def close(self) -> None:
+        """See Transport.close."""
+        self._socket.close()
