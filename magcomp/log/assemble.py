@@ -1,0 +1,257 @@
+"""From a log's bytes to a Recording: the part shared by files and the live buffer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from magcomp.errors import LogError
+from magcomp.log import quantities
+from magcomp.log.checksum import ByteArray, OffsetArray
+from magcomp.log.clock import (
+    MICROSECOND_WRAP,
+    MILLISECOND_WRAP,
+    NO_STAMP,
+    SECOND,
+    Stamps,
+    time_axis,
+)
+from magcomp.log.columns import WANTED, Message, Table, crc_extra, decode
+from magcomp.log.frames import Frames, Scan, scan
+from magcomp.log.quantities import Messages, Timed
+from magcomp.log.repeats import repeated
+from magcomp.log.vehicles import Identity, choose, is_armed
+from magcomp.model import FloatArray, ParameterHistory, ReadReport, Recording, Series, Vehicle
+
+Buffer = bytes | bytearray | memoryview | ByteArray
+
+# Stamped in milliseconds as they are sent.
+_LEADING = (
+    Message.ATTITUDE,
+    Message.SCALED_IMU,
+    Message.SCALED_IMU2,
+    Message.SCALED_IMU3,
+    Message.SYSTEM_TIME,
+)
+# The position's time is that of the fix; microseconds wrap after 71 minutes, and in some firmware
+# are not those since boot.
+_FOLLOWING = (Message.GLOBAL_POSITION_INT, Message.RAW_IMU, Message.SERVO_OUTPUT_RAW)
+_MICROSECONDS = (Message.RAW_IMU, Message.SERVO_OUTPUT_RAW)
+
+# A recorder whose clock says that it is earlier than 2001 does not know the date.
+_EARLIEST_UNIX_S = 1.0e9
+
+SIMULATION_PREFIX = "SIM_"
+
+_LOOK = 1024
+_TEXT_SHARE = 0.95
+_PRINTABLE = frozenset(range(32, 127)) | {9, 10, 13}
+
+
+@dataclass(frozen=True, eq=False)
+class Decoded:
+    """One vehicle's messages on one time axis.
+
+    Attributes
+    ----------
+    who
+        The vehicle.
+    messages
+        Time and columns by message id; a message that did not come has no entry.
+    start_unix_s
+        Unix time of time zero; NaN where unknown.
+    duration_s
+        Time of the last used message.
+    report
+        What became of the bytes.
+    """
+
+    who: Identity
+    messages: Messages
+    start_unix_s: float
+    duration_s: float
+    report: ReadReport
+
+
+def recording_from_bytes(
+    data: Buffer,
+    source: str,
+    system: int | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Recording:
+    """Read a telemetry log that is already in memory.
+
+    Parameters
+    ----------
+    data
+        Records of eight bytes of time and one MAVLink frame, as a .tlog holds them.
+    source
+        Name of the log or address of the link, for people.
+    system
+        The vehicle's MAVLink system, or None where there is only one.
+    progress
+        Called with the read fraction, 0 to 1.
+
+    Returns
+    -------
+    Recording
+        SIM_* parameters are left out: in a simulation they are the truth.
+
+    Raises
+    ------
+    LogError
+        There is no MAVLink frame, or no autopilot's heartbeat.
+    ChooseVehicleError
+        There are several vehicles and ``system`` is None, or ``system`` is not there.
+    """
+    return _recording(decode_vehicle(data, source, system, WANTED, progress), source)
+
+
+def decode_vehicle(
+    data: Buffer,
+    source: str,
+    system: int | None,
+    wanted: frozenset[int],
+    progress: Callable[[float], None] | None = None,
+) -> Decoded:
+    """Decode the wanted messages of one vehicle and give them a time.
+
+    Messages beyond those a Recording needs get a time but do not touch that of the others.
+    """
+    octets = np.frombuffer(data, dtype=np.uint8)
+    found = scan(octets, wanted, crc_extra(), progress)
+    if not found.verified:
+        raise LogError(f"Log {source} must hold MAVLink frames; instead received {_look(octets)}.")
+    heartbeats = found.frames[found.frames.message == Message.HEARTBEAT]
+    who = choose(source, heartbeats, decode(octets, heartbeats, Message.HEARTBEAT), system)
+    mine = (found.frames.system == who.system) & (found.frames.component == who.component)
+    frames = found.frames[mine]
+    rows = _rows(frames)
+    tables = {message: decode(octets, frames[rows[message]], message) for message in rows}
+    copies = repeated(frames, _stamps(len(frames), rows, tables))
+    if copies.any():
+        tables = {message: tables[message][~copies[rows[message]]] for message in rows}
+        frames = frames[~copies]
+        rows = _rows(frames)
+    axis = _axis(frames, rows, tables)
+    core = np.isin(frames.message, list(WANTED))
+    first = int(np.argmin(np.where(core, axis, np.inf)))
+    zero = axis[first]
+    messages = {m: _in_order(axis[rows[m]] - zero, tables[m]) for m in rows if len(rows[m])}
+    start = float(frames.arrival[first]) / SECOND
+    return Decoded(
+        who=who,
+        messages=messages,
+        start_unix_s=start if start > _EARLIEST_UNIX_S else quantities.unix_offset(messages),
+        duration_s=float(axis[core].max() - zero),
+        report=_report(octets, found, who, int(core.sum()), int(copies.sum())),
+    )
+
+
+def _recording(decoded: Decoded, source: str) -> Recording:
+    messages, who = decoded.messages, decoded.who
+    parameters = ParameterHistory(
+        tuple(
+            change
+            for change in quantities.parameters(messages, who.autopilot)
+            if not change.name.startswith(SIMULATION_PREFIX)
+        )
+    )
+    heartbeats = messages[Message.HEARTBEAT]
+    return Recording(
+        source=source,
+        vehicle=Vehicle(
+            autopilot=who.autopilot,
+            kind=who.kind,
+            system=who.system,
+            component=who.component,
+            firmware=quantities.firmware(messages),
+            device_ids=quantities.device_ids(parameters),
+        ),
+        start_unix_s=decoded.start_unix_s,
+        duration_s=decoded.duration_s,
+        field=MappingProxyType(quantities.field(messages)),
+        parameters=parameters,
+        report=decoded.report,
+        attitude=quantities.attitude(messages),
+        gyro=quantities.gyro(messages),
+        accel=quantities.accel(messages),
+        throttle=quantities.throttle(messages),
+        current=quantities.current(messages),
+        voltage=quantities.voltage(messages),
+        outputs=quantities.outputs(messages),
+        position=quantities.position(messages),
+        armed=Series(heartbeats.time, is_armed(heartbeats.table)),
+    )
+
+
+def _rows(frames: Frames) -> dict[int, NDArray[np.intp]]:
+    """Which frames carry each message, in the order of the stream."""
+    present = np.flatnonzero(np.bincount(frames.message))
+    return {int(m): np.flatnonzero(frames.message == m) for m in present}
+
+
+def _stamp_of(message: int, table: Table) -> OffsetArray:
+    """The vehicle's time of each row in microseconds, shape (n,)."""
+    if message in _MICROSECONDS:
+        return table["time_usec"].astype(np.int64)
+    return table["time_boot_ms"].astype(np.int64) * 1000
+
+
+def _stamps(n: int, rows: dict[int, NDArray[np.intp]], tables: dict[int, Table]) -> OffsetArray:
+    """The vehicle's time of each frame, or ``NO_STAMP``, shape (n,). A clock at 0 says nothing."""
+    result = np.full(n, NO_STAMP, dtype=np.int64)
+    for message in rows.keys() & {*_LEADING, *_FOLLOWING}:
+        stamp = _stamp_of(message, tables[message])
+        result[rows[message]] = np.where(stamp > 0, stamp, NO_STAMP)
+    return result
+
+
+def _axis(
+    frames: Frames, rows: dict[int, NDArray[np.intp]], tables: dict[int, Table]
+) -> FloatArray:
+    """Time of each frame in seconds from an arbitrary zero, shape (n,)."""
+    groups = [
+        Stamps(
+            rows[m],
+            _stamp_of(m, tables[m]),
+            MICROSECOND_WRAP if m in _MICROSECONDS else MILLISECOND_WRAP,
+        )
+        for m in (*_LEADING, *_FOLLOWING)
+        if m in rows
+    ]
+    leading = sum(m in rows for m in _LEADING)
+    return time_axis(frames.arrival, frames.payload, groups[:leading], groups[leading:])
+
+
+def _in_order(time: FloatArray, table: Table) -> Timed:
+    if (np.diff(time) >= 0).all():
+        return Timed(time, table)
+    order = np.argsort(time, kind="stable")
+    return Timed(time[order], table[order])
+
+
+def _report(octets: ByteArray, found: Scan, who: Identity, used: int, copies: int) -> ReadReport:
+    return ReadReport(
+        size=len(octets),
+        frames=found.total,
+        used=used,
+        bad_checksum=found.bad_checksum,
+        skipped=found.skipped,
+        duplicates=copies,
+        others=tuple(pair for pair in found.talkers if pair != (who.system, who.component)),
+    )
+
+
+def _look(octets: ByteArray) -> str:
+    """What bytes that are no log look like, for the user."""
+    if not len(octets):
+        return "an empty file"
+    head = bytes(octets[:_LOOK])
+    printable = sum(octet in _PRINTABLE for octet in head)
+    kind = "text" if printable > _TEXT_SHARE * len(head) else "data"
+    return f"{len(octets)} bytes of {kind} without one sound frame"

@@ -1,0 +1,44 @@
+"""Open a log's bytes without loading them."""
+
+from __future__ import annotations
+
+import mmap
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from magcomp.errors import LogError
+from magcomp.log.checksum import ByteArray
+
+
+@contextmanager
+def mapped(path: str | Path) -> Iterator[ByteArray]:
+    """Bytes of a file, brought into memory by the operating system as they are touched.
+
+    Nothing that outlives the block may refer to the array.
+
+    Raises
+    ------
+    LogError
+        There is no such file, it is not a regular file, or it cannot be read.
+    """
+    location = Path(path)
+    try:
+        kind = location.stat().st_mode
+        if not stat.S_ISREG(kind):
+            what = "a directory" if stat.S_ISDIR(kind) else "something that is no file"
+            raise LogError(f"Log {path} must be a file; instead received {what}.")
+        if not location.stat().st_size:
+            yield np.zeros(0, dtype=np.uint8)
+            return
+        with location.open("rb") as file:
+            content = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+    except FileNotFoundError:
+        raise LogError(f"Log {path} must exist; instead found no such file.") from None
+    except (OSError, ValueError) as error:
+        raise LogError(f"Log {path} must be readable; instead received: {error}.") from error
+    # Arrays still refer to the mapping when a caller's error is on its way; it closes with them.
+    yield np.frombuffer(content, dtype=np.uint8)
