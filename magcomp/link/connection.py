@@ -176,9 +176,7 @@ class Connection:
             The connection was closed.
         """
         with self._changed:
-            self._changed.wait_for(
-                lambda: self._inbox or self._ended or self._stop.is_set(), max(timeout, 0.0)
-            )
+            self._changed.wait_for(lambda: self._inbox or self._over(), max(timeout, 0.0))
             self._raise_failure()
             if self._inbox:
                 return self._inbox.popleft()
@@ -261,11 +259,10 @@ class Connection:
             while not self._stop.is_set():
                 self._step()
         except ReplayEndedError:
-            pass
+            self._ended = True
         except Exception as error:  # whatever it is, the caller's thread must hear of it
             self._failure = error
         with self._changed:
-            self._ended = True
             self._changed.notify_all()
 
     def _step(self) -> None:
@@ -338,16 +335,20 @@ class Connection:
     def _now(self) -> float:
         return self._transport.clock.monotonic()
 
+    def _over(self) -> bool:
+        """Tell whether nothing more can arrive."""
+        return self._ended or self._failure is not None or self._stop.is_set()
+
     def _vehicle_clear(self) -> bool:
         now = self._now()
         found = self._state.settled(now) and (
             self._state.ambiguous() or self._state.identified(now)
         )
-        return found or self._ended
+        return found or self._over()
 
     def _streams_idle(self) -> bool:
         report = self._state.stream_report
-        return report is None or report.complete or self._ended
+        return report is None or report.complete or self._over()
 
     def _why_no_vehicle(self, seconds: float) -> str:
         return why_no_vehicle(

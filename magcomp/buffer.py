@@ -1,0 +1,286 @@
+"""What a live vehicle has said so far, in bounded memory, ready to be fitted each second.
+
+The buffer keeps the frames a fit needs as they came, so that a snapshot is read by the same
+code that reads a log, and gives the same numbers. Over its bound:
+
+1. Streams faster than 20 Hz are halved, the oldest block of ten seconds first, then
+   the next, and again, until none is above 20 Hz. Compasses are read at 10 Hz: what goes
+   are mostly repeats.
+2. After that the oldest blocks go. The vehicle's parameters and identity stay for ever;
+   only reports that repeat the value before them go.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+import threading
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from magcomp.log.assemble import recording_from_bytes
+from magcomp.log.columns import WANTED, Message
+from magcomp.model import FloatArray, Recording
+
+DEFAULT_LIMIT = 16 << 20
+"""Bytes: about half an hour of everything at 50 Hz, or more than an hour thinned."""
+
+LEVELS = 10
+"""Control levels of the coverage: a tenth of full throttle each."""
+
+BANDS, SECTORS = 6, 12
+"""The coverage's sphere: bands of equal height, so of equal area, and sectors."""
+
+_BLOCK_US = 10_000_000
+_FASTEST_HZ = 20.0
+_STAMP = struct.Struct(">Q")
+_ATTITUDE = struct.Struct("<Ifff")
+_VFR_HUD = struct.Struct("<ffffhH")
+_PINNED = frozenset({Message.PARAM_VALUE, Message.AUTOPILOT_VERSION, Message.STATUSTEXT})
+_PARAMETER_NAME = slice(8, 24)
+_TYPICAL_DIP = math.radians(60.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Coverage:
+    """Which directions the earth's field has had in body axes, by throttle.
+
+    Attributes
+    ----------
+    counts
+        Attitudes in each cell, shape (LEVELS, BANDS · SECTORS).
+    """
+
+    counts: NDArray[np.int64]
+
+    @property
+    def fraction(self) -> FloatArray:
+        """Share of the sphere's cells seen at each level, 0 … 1, shape (LEVELS,)."""
+        return np.asarray((self.counts > 0).mean(axis=1), dtype=np.float64)
+
+    @property
+    def share(self) -> FloatArray:
+        """Share of the time at each level, shape (LEVELS,); zeros before the first attitude."""
+        total = max(int(self.counts.sum()), 1)
+        return np.asarray(self.counts.sum(axis=1) / total, dtype=np.float64)
+
+    @staticmethod
+    def level_edges() -> FloatArray:
+        """Throttle 0 … 1 where the levels begin and end, shape (LEVELS + 1,)."""
+        return np.linspace(0.0, 1.0, LEVELS + 1)
+
+
+@dataclass
+class _Block:
+    """Consecutive records of about ten seconds."""
+
+    begin_us: int
+    end_us: int
+    records: bytearray = field(default_factory=bytearray)
+    thinned: int = 0
+    at_floor: bool = False
+
+
+class Buffer:
+    """The recording so far of a live link. One thread may add while another takes snapshots.
+
+    Parameters
+    ----------
+    source
+        Address of the link, for people.
+    limit
+        Bytes to keep at most, parameters and identity aside.
+    dip_rad
+        Dip of the field whose directions the coverage counts. Its exact value does not
+        matter: it only says where on the sphere a level turn lies.
+    """
+
+    def __init__(
+        self, source: str, *, limit: int = DEFAULT_LIMIT, dip_rad: float = _TYPICAL_DIP
+    ) -> None:
+        self._source = source
+        self._limit = limit
+        self._size = 0
+        self._blocks: list[_Block] = []
+        self._kept = bytearray()
+        self._kept_values: dict[bytes, bytes] = {}
+        self._lock = threading.Lock()
+        self._field = (math.cos(dip_rad), math.sin(dip_rad))
+        self._level = 0
+        self._counts = np.zeros((LEVELS, BANDS * SECTORS), dtype=np.int64)
+
+    @property
+    def size(self) -> int:
+        """Bytes held."""
+        with self._lock:
+            return self._size + len(self._kept)
+
+    def add(self, unix_us: int, frame: bytes) -> None:
+        """Take one whole frame that arrived at ``unix_us``; what no fit needs is passed over."""
+        message = _message_id(frame)
+        if message not in WANTED:
+            return
+        with self._lock:
+            block = self._block(unix_us)
+            block.end_us = unix_us
+            block.records += _STAMP.pack(unix_us)
+            block.records += frame
+            self._size += len(frame) + _STAMP.size
+            self._cover(message, frame)
+            while self._size > self._limit and self._shrink():
+                pass
+
+    def data(self) -> bytes:
+        """Give everything held, in the form of a .tlog."""
+        with self._lock:
+            return b"".join([self._kept, *(block.records for block in self._blocks)])
+
+    def snapshot(self, system: int | None = None) -> Recording:
+        """Give the recording so far, read as a log of the same frames would be.
+
+        Parameters
+        ----------
+        system
+            The vehicle's MAVLink system; None where there is only one.
+
+        Raises
+        ------
+        LogError
+            No vehicle has been heard yet.
+        ChooseVehicleError
+            There are several vehicles and none was chosen.
+        """
+        return recording_from_bytes(self.data(), self._source, system)
+
+    def coverage(self) -> Coverage:
+        """Give the attitudes seen so far; counted as they came, so thinning changes nothing."""
+        with self._lock:
+            counts = self._counts.copy()
+        counts.setflags(write=False)
+        return Coverage(counts)
+
+    # ---------------------------------------------------------------- coverage
+
+    def _cover(self, message: int, frame: bytes) -> None:
+        if message == Message.VFR_HUD:
+            throttle = _unpack(_VFR_HUD, frame)[5] * 0.01
+            self._level = min(int(throttle * LEVELS), LEVELS - 1)
+        elif message == Message.ATTITUDE:
+            _, roll, pitch, yaw = _unpack(_ATTITUDE, frame)
+            if math.isfinite(roll + pitch + yaw):
+                cell = sphere_cell(*self._field_direction(roll, pitch, yaw))
+                self._counts[self._level, cell] += 1
+
+    def _field_direction(self, roll: float, pitch: float, yaw: float) -> tuple[float, float, float]:
+        """Unit vector of a northward, dipping field in body axes."""
+        north, down = self._field
+        ahead, right = north * math.cos(yaw), -north * math.sin(yaw)
+        x = ahead * math.cos(pitch) - down * math.sin(pitch)
+        below = ahead * math.sin(pitch) + down * math.cos(pitch)
+        y = right * math.cos(roll) + below * math.sin(roll)
+        z = below * math.cos(roll) - right * math.sin(roll)
+        return x, y, z
+
+    # ---------------------------------------------------------------- the bound
+
+    def _block(self, unix_us: int) -> _Block:
+        last = self._blocks[-1] if self._blocks else None
+        # A clock set back must not make a block that never ends.
+        if last is None or not 0 <= unix_us - last.begin_us < _BLOCK_US:
+            last = _Block(unix_us, unix_us)
+            self._blocks.append(last)
+        return last
+
+    def _shrink(self) -> bool:
+        """Thin or drop the oldest block; False where only the one being filled is left."""
+        finished = self._blocks[:-1]
+        if not finished:
+            return False
+        thinnable = [block for block in finished if not block.at_floor]
+        if thinnable:
+            self._thin(min(thinnable, key=lambda block: block.thinned))
+        else:
+            self._drop(self._blocks.pop(0))
+        return True
+
+    def _thin(self, block: _Block) -> None:
+        seconds = max(block.end_us - block.begin_us, 1) * 1e-6
+        counts = Counter(_stream(record) for record in _records(block.records))
+        fast = {stream for stream, count in counts.items() if count > _FASTEST_HZ * seconds}
+        fast = {stream for stream in fast if stream[2] not in _PINNED}
+        if not fast:
+            block.at_floor = True
+            return
+        turn: Counter[tuple[int, int, int]] = Counter()
+        kept = bytearray()
+        for record in _records(block.records):
+            stream = _stream(record)
+            turn[stream] += 1
+            if stream not in fast or turn[stream] % 2:
+                kept += record
+        self._size -= len(block.records) - len(kept)
+        block.records = kept
+        block.thinned += 1
+
+    def _drop(self, block: _Block) -> None:
+        self._size -= len(block.records)
+        for record in _records(block.records):
+            frame = bytes(record[_STAMP.size :])
+            message = _message_id(frame)
+            if message not in _PINNED:
+                continue
+            payload = _payload(frame)
+            source = bytes(_stream(record)[:2]) + message.to_bytes(3, "little")
+            if message == Message.PARAM_VALUE:
+                key, value = source + payload[_PARAMETER_NAME], payload[:4]
+            else:
+                key, value = source + payload, b""
+            if self._kept_values.get(key) != value:
+                self._kept_values[key] = value
+                self._kept += record
+
+
+def sphere_cell(x: float, y: float, z: float) -> int:
+    """Cell of a unit vector: 0 is at the top (z = −1, up in body axes), sectors from x to y."""
+    band = min(int((z + 1.0) * 0.5 * BANDS), BANDS - 1)
+    sector = min(int((math.atan2(y, x) / math.tau % 1.0) * SECTORS), SECTORS - 1)
+    return max(band, 0) * SECTORS + sector
+
+
+def _records(data: bytearray) -> Iterator[bytes]:
+    position = 0
+    while position < len(data):
+        size = _STAMP.size + _frame_size(data, position + _STAMP.size)
+        yield bytes(data[position : position + size])
+        position += size
+
+
+def _frame_size(data: bytes | bytearray, start: int) -> int:
+    if data[start] == 0xFE:
+        return data[start + 1] + 8
+    return data[start + 1] + (25 if data[start + 2] & 1 else 12)
+
+
+def _message_id(frame: bytes) -> int:
+    return frame[5] if frame[0] == 0xFE else int.from_bytes(frame[7:10], "little")
+
+
+def _stream(record: bytes) -> tuple[int, int, int]:
+    """System, component and message of a record."""
+    frame = record[_STAMP.size :]
+    at = 3 if frame[0] == 0xFE else 5
+    return frame[at], frame[at + 1], _message_id(frame)
+
+
+def _payload(frame: bytes) -> bytes:
+    header = 6 if frame[0] == 0xFE else 10
+    return frame[header : header + frame[1]]
+
+
+def _unpack(layout: struct.Struct, frame: bytes) -> tuple[float, ...]:
+    """Read the first fields of a payload, whose trailing zeros MAVLink 2 leaves out."""
+    return layout.unpack(_payload(frame)[: layout.size].ljust(layout.size, b"\0"))
