@@ -1,0 +1,270 @@
+"""One function a message: what the autopilot knows, put into MAVLink's fields and units."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from magcomp.simulate.flight import GRAVITY
+from magcomp.simulate.motion import euler
+from magcomp.simulate.physics import Block
+from magcomp.simulate.truth import MOTORS
+
+FloatArray = NDArray[np.float64]
+
+_METRES_PER_DEGREE = 111_319.5
+_ABSENT_VOLTAGE = 65535
+_IMU_TEMPERATURE = 3500
+_SENSORS = 1_399_979_055
+_SENSORS_ENABLED = 1_130_470_447
+_EKF_FLAGS = 831
+
+
+@dataclass(frozen=True, eq=False)
+class Battery:
+    """What the battery monitor said last; None where there is no monitor.
+
+    Attributes
+    ----------
+    current, voltage
+        A and V.
+    used_ah, left
+        Charge drawn, and the part of the capacity that is left, 0 … 1.
+    """
+
+    current: float
+    voltage: float
+    used_ah: float
+    left: float
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """What the autopilot knows at one step.
+
+    Attributes
+    ----------
+    boot_s, unix_s
+        Seconds since boot and since 1970.
+    block, step
+        The physics, and which of its ten steps.
+    attitude
+        Estimated roll, pitch and yaw at that step, radians, shape (3,).
+    corrected
+        Corrected field of each compass, mGauss, shape (3, 3).
+    throttle
+        Thrust demand as last read, 0 … 1.
+    outputs
+        Servo outputs of the motors, microseconds, shape (4,).
+    home
+        Latitude and longitude in degrees, metres above sea level.
+    battery
+        The battery monitor.
+    """
+
+    boot_s: float
+    unix_s: float
+    block: Block
+    step: int
+    attitude: FloatArray
+    corrected: FloatArray
+    throttle: float
+    outputs: FloatArray
+    home: tuple[float, float, float]
+    battery: Battery | None
+
+    @property
+    def boot_ms(self) -> int:
+        """Milliseconds since boot."""
+        return round(self.boot_s * 1e3)
+
+    @property
+    def boot_us(self) -> int:
+        """Microseconds since boot."""
+        return round(self.boot_s * 1e6)
+
+    @property
+    def position(self) -> FloatArray:
+        """Metres north, east and down from home, shape (3,)."""
+        return np.asarray(self.block.motion.position[self.step])
+
+    @property
+    def velocity(self) -> FloatArray:
+        """North, east and down, m/s, shape (3,)."""
+        return np.asarray(self.block.motion.velocity[self.step])
+
+    def geodetic(self) -> tuple[int, int, float]:
+        """Latitude and longitude in 1e-7 degrees, metres above sea level."""
+        north, east, down = self.position
+        latitude, longitude, altitude = self.home
+        east_degree = _METRES_PER_DEGREE * np.cos(np.radians(latitude))
+        return (
+            round((latitude + north / _METRES_PER_DEGREE) * 1e7),
+            round((longitude + east / east_degree) * 1e7),
+            altitude - down,
+        )
+
+
+def build(message: int, view: View) -> Any | None:
+    """Make one telemetry message; None where the vehicle has nothing to say in it."""
+    return _BUILDERS[message](view)
+
+
+def _whole(value: FloatArray) -> list[int]:
+    """Cut towards zero and keep within 16 bits, as the firmware's conversion does."""
+    return [int(v) for v in np.clip(np.trunc(value), -32768, 32767)]
+
+
+def _centiamperes(battery: Battery) -> int:
+    return min(int(battery.current * 100.0), 32767)
+
+
+def _attitude(view: View) -> Any:
+    roll, pitch, yaw = view.attitude.tolist()
+    rates = view.block.gyro[0, view.step].tolist()
+    return mavlink.MAVLink_attitude_message(view.boot_ms, roll, pitch, yaw, *rates)
+
+
+def _servo_output_raw(view: View) -> Any:
+    outputs = [round(value) for value in view.outputs] + [0] * (16 - MOTORS)
+    return mavlink.MAVLink_servo_output_raw_message(
+        view.boot_us & 0xFFFFFFFF, 0, *outputs[:8], *outputs[8:]
+    )
+
+
+def _imu_fields(view: View, imu: int) -> list[int]:
+    accel = _whole(view.block.accel[imu, view.step] * 1000.0 / GRAVITY)
+    return accel + _whole(view.block.gyro[imu, view.step] * 1000.0)
+
+
+def _raw_imu(view: View) -> Any:
+    mag = _whole(view.corrected[0])
+    return mavlink.MAVLink_raw_imu_message(
+        view.boot_us, *_imu_fields(view, 0), *mag, 0, _IMU_TEMPERATURE
+    )
+
+
+def _scaled_imu2(view: View) -> Any:
+    mag = _whole(view.corrected[1])
+    return mavlink.MAVLink_scaled_imu2_message(
+        view.boot_ms, *_imu_fields(view, 1), *mag, _IMU_TEMPERATURE
+    )
+
+
+def _scaled_imu3(view: View) -> Any:
+    # Two IMUs and three compasses, as on the boards people fly.
+    mag = _whole(view.corrected[2])
+    return mavlink.MAVLink_scaled_imu3_message(view.boot_ms, *[0] * 6, *mag, 0)
+
+
+def _simstate(view: View) -> Any:
+    pose = view.block.motion.earth_from_body[view.step]
+    latitude, longitude, _ = view.geodetic()
+    return mavlink.MAVLink_simstate_message(
+        *euler(pose).tolist(),
+        *view.block.force[view.step].tolist(),
+        *view.block.rates[view.step].tolist(),
+        latitude,
+        longitude,
+    )
+
+
+def _vfr_hud(view: View) -> Any:
+    north, east, down = view.velocity.tolist()
+    ground_speed = float(np.hypot(north, east))
+    return mavlink.MAVLink_vfr_hud_message(
+        airspeed=ground_speed,
+        groundspeed=ground_speed,
+        heading=int(np.degrees(view.attitude[2]) % 360.0),
+        throttle=int(view.throttle * 100.0),
+        alt=view.geodetic()[2],
+        climb=-down,
+    )
+
+
+def _battery_status(view: View) -> Any | None:
+    battery = view.battery
+    if battery is None:
+        return None
+    cell_voltages = [round(battery.voltage * 1e3)] + [_ABSENT_VOLTAGE] * 9
+    return mavlink.MAVLink_battery_status_message(
+        id=0,
+        battery_function=0,
+        type=0,
+        temperature=32767,
+        voltages=cell_voltages,
+        current_battery=_centiamperes(battery),
+        current_consumed=int(battery.used_ah * 1e3),
+        energy_consumed=int(battery.used_ah * battery.voltage * 36.0),
+        battery_remaining=int(battery.left * 100.0),
+        time_remaining=0,
+        charge_state=1,
+    )
+
+
+def _sys_status(view: View) -> Any:
+    battery = view.battery
+    return mavlink.MAVLink_sys_status_message(
+        onboard_control_sensors_present=_SENSORS,
+        onboard_control_sensors_enabled=_SENSORS_ENABLED,
+        onboard_control_sensors_health=_SENSORS,
+        load=200,
+        voltage_battery=0 if battery is None else round(battery.voltage * 1e3),
+        current_battery=-1 if battery is None else _centiamperes(battery),
+        battery_remaining=-1 if battery is None else int(battery.left * 100.0),
+        drop_rate_comm=0,
+        errors_comm=0,
+        errors_count1=0,
+        errors_count2=0,
+        errors_count3=0,
+        errors_count4=0,
+    )
+
+
+def _ekf_status_report(view: View) -> Any:  # noqa: ARG001
+    return mavlink.MAVLink_ekf_status_report_message(_EKF_FLAGS, 0.03, 0.01, 0.01, 0.03, 0.0)
+
+
+def _global_position_int(view: View) -> Any:
+    latitude, longitude, altitude = view.geodetic()
+    return mavlink.MAVLink_global_position_int_message(
+        view.boot_ms,
+        latitude,
+        longitude,
+        round(altitude * 1e3),
+        round((altitude - view.home[2]) * 1e3),
+        *_whole(view.velocity * 100.0),
+        int(np.degrees(view.attitude[2]) % 360.0 * 100.0),
+    )
+
+
+def _local_position_ned(view: View) -> Any:
+    return mavlink.MAVLink_local_position_ned_message(
+        view.boot_ms, *view.position.tolist(), *view.velocity.tolist()
+    )
+
+
+def _system_time(view: View) -> Any:
+    return mavlink.MAVLink_system_time_message(round(view.unix_s * 1e6), view.boot_ms)
+
+
+_BUILDERS: Mapping[int, Callable[[View], Any | None]] = {
+    mavlink.MAVLINK_MSG_ID_ATTITUDE: _attitude,
+    mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: _servo_output_raw,
+    mavlink.MAVLINK_MSG_ID_RAW_IMU: _raw_imu,
+    mavlink.MAVLINK_MSG_ID_SCALED_IMU2: _scaled_imu2,
+    mavlink.MAVLINK_MSG_ID_SCALED_IMU3: _scaled_imu3,
+    mavlink.MAVLINK_MSG_ID_SIMSTATE: _simstate,
+    mavlink.MAVLINK_MSG_ID_VFR_HUD: _vfr_hud,
+    mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: _battery_status,
+    mavlink.MAVLINK_MSG_ID_SYS_STATUS: _sys_status,
+    mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT: _ekf_status_report,
+    mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: _global_position_int,
+    mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: _local_position_ned,
+    mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: _system_time,
+}
