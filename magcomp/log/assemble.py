@@ -39,7 +39,7 @@ _LEADING = (
 )
 # The position's time is that of the fix; microseconds wrap after 71 minutes, and in some firmware
 # are not those since boot.
-_FOLLOWING = (Message.GLOBAL_POSITION_INT, Message.RAW_IMU, Message.SERVO_OUTPUT_RAW)
+_FOLLOWING = (Message.RAW_IMU, Message.SERVO_OUTPUT_RAW, Message.GLOBAL_POSITION_INT)
 _MICROSECONDS = (Message.RAW_IMU, Message.SERVO_OUTPUT_RAW)
 
 # A recorder whose clock says that it is earlier than 2001 does not know the date.
@@ -138,7 +138,9 @@ def decode_vehicle(
         frames = frames[~copies]
         rows = _rows(frames)
     axis = _axis(frames, rows, tables)
-    core = np.isin(frames.message, list(WANTED))
+    core = np.ones(len(frames), dtype=bool)
+    for message in rows.keys() - WANTED:
+        core[rows[message]] = False
     first = int(np.argmin(np.where(core, axis, np.inf)))
     zero = axis[first]
     messages = {m: _in_order(axis[rows[m]] - zero, tables[m]) for m in rows if len(rows[m])}
@@ -220,6 +222,7 @@ def _axis(
             rows[m],
             _stamp_of(m, tables[m]),
             MICROSECOND_WRAP if m in _MICROSECONDS else MILLISECOND_WRAP,
+            at_sending=m != Message.GLOBAL_POSITION_INT,
         )
         for m in (*_LEADING, *_FOLLOWING)
         if m in rows

@@ -67,19 +67,22 @@ def checksums(
     words = spans >> 1
     still_active = len(words) - np.cumsum(np.bincount(words))
     register = np.full(len(spans), 0xFFFF, dtype=np.uint16)
-    position = start[order].astype(np.intp)
-    pairs = data[:-1].astype(np.uint16) | (data[1:].astype(np.uint16) << 8)
+    first = start[order]
+    # The words that begin at even places, then those that begin at odd ones: whichever a span
+    # begins with, its next word stands beside it.
+    even, odd = data[: len(data) // 2 * 2], data[1 : (len(data) - 1) // 2 * 2 + 1]
+    pairs = np.concatenate([even.view("<u2"), odd.view("<u2")])
+    position = (first >> 1) + (first & 1) * (len(even) // 2)
     step = _word_step()
     read = np.empty(len(spans), dtype=np.uint16)
     state = np.empty(len(spans), dtype=np.intp)
     # "clip" only spares numpy a copy: no index is out of range.
-    for n in still_active[:-1].tolist():
-        np.take(pairs, position[:n], out=read[:n], mode="clip")
+    for at, n in enumerate(still_active[:-1].tolist()):
+        np.take(pairs[at:], position[:n], out=read[:n], mode="clip")
         np.bitwise_xor(read[:n], register[:n], out=state[:n])
         np.take(step, state[:n], out=register[:n], mode="clip")
-        position[:n] += 2
-    odd = np.flatnonzero(spans & 1)
-    register[odd] = _add_byte(register[odd], data[position[odd]])
+    left = np.flatnonzero(spans & 1)
+    register[left] = _add_byte(register[left], data[first[left] + spans[left] - 1])
     result[order] = _add_byte(register, extra[order])
     return result
 

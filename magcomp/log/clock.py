@@ -47,11 +47,15 @@ class Stamps:
         Vehicle's time in microseconds as sent, shape (n,).
     wrap
         The clock's range in microseconds.
+    at_sending
+        Whether this is when the message was sent, so that its neighbours were sent then, too.
+        A position may carry the time of the fix.
     """
 
     rows: NDArray[np.intp]
     time: OffsetArray
     wrap: int
+    at_sending: bool = True
 
 
 class _Stream(NamedTuple):
@@ -59,6 +63,13 @@ class _Stream(NamedTuple):
 
     arrival: OffsetArray
     place: OffsetArray
+
+
+class _Settled(NamedTuple):
+    """Frames and their microseconds on the leading axis, shape (n,) each."""
+
+    rows: NDArray[np.intp]
+    time: OffsetArray
 
 
 def time_axis(
@@ -90,15 +101,18 @@ def time_axis(
         return _recorder_axis(arrival)
     leader, *followers = usable
     elapsed = _unroll(leader, arrival[leader.rows])
-    rows = [leader.rows]
-    times = [elapsed]
-    for stamps in followers:
-        settled_rows, settled = _settle(stamps, leader, elapsed, stream)
-        rows.append(settled_rows)
-        times.append(settled)
-    anchor = np.concatenate(rows)
-    order = np.argsort(anchor, kind="stable")
-    axis = _between(np.concatenate(times)[order], anchor[order], stream)
+    settled = [_settle(stamps, leader, elapsed, stream) for stamps in followers]
+    sent = [s for s, stamps in zip(settled, followers, strict=True) if stamps.at_sending]
+    rows = np.concatenate([leader.rows, *(s.rows for s in sent)])
+    time = np.concatenate([elapsed, *(s.time for s in sent)])
+    order = np.argsort(rows, kind="stable")
+    anchors, time = rows[order], time[order]
+    axis = np.zeros(len(arrival), dtype=np.int64)
+    bare = np.ones(len(arrival), dtype=bool)
+    axis[anchors], bare[anchors] = time, False
+    axis[bare] = _between(time, anchors, np.flatnonzero(bare), stream)
+    for own in settled:
+        axis[own.rows] = own.time
     return axis.astype(np.float64) / SECOND
 
 
@@ -135,50 +149,58 @@ def _unroll(stamps: Stamps, arrival: OffsetArray) -> OffsetArray:
     return np.concatenate([np.zeros(1, dtype=np.int64), np.cumsum(step)])
 
 
-def _settle(
-    stamps: Stamps, leading: Stamps, elapsed: OffsetArray, stream: _Stream
-) -> tuple[NDArray[np.intp], OffsetArray]:
+def _settle(stamps: Stamps, leader: Stamps, elapsed: OffsetArray, stream: _Stream) -> _Settled:
     """Times of another kind of message on the leading axis, where both agree."""
-    nothing = np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.int64)
-    if not _runs(stamps):
-        return nothing
-    after = np.searchsorted(leading.rows, stamps.rows)
-    before = np.clip(after - 1, 0, len(elapsed) - 1)
-    after = np.clip(after, 0, len(elapsed) - 1)
-    expected = _between(elapsed, leading.rows, stream)[stamps.rows]
+    before, after = _neighbours(leader.rows, stamps.rows, len(stream.arrival))
+    expected = _between(elapsed, leader.rows, stamps.rows, stream)
     room = np.abs(elapsed[after] - elapsed[before]) + _DISORDER
     best = np.full(len(stamps.rows), np.iinfo(np.int64).max)
     settled = np.zeros(len(stamps.rows), dtype=np.int64)
     for neighbour in (before, after):
         # Either neighbour may lie on the other side of a reboot.
-        time = stamps.time + (elapsed[neighbour] - leading.time[neighbour])
+        time = stamps.time + (elapsed[neighbour] - leader.time[neighbour])
         time += stamps.wrap * np.rint((expected - time) / stamps.wrap).astype(np.int64)
         error = np.abs(time - expected)
         settled = np.where(error < best, time, settled)
         best = np.minimum(error, best)
     usable: MaskArray = best <= room
     if usable.mean() < _USABLE_SHARE:
-        return nothing
-    return stamps.rows[usable], settled[usable]
+        usable[:] = False
+    return _Settled(stamps.rows[usable], settled[usable])
 
 
-def _between(time: OffsetArray, rows: NDArray[np.intp], stream: _Stream) -> OffsetArray:
-    """Times of all frames from those of some, by their place between them, shape (n,)."""
-    arrival, place = stream
-    index = np.arange(len(arrival), dtype=np.intp)
-    after = np.searchsorted(rows, index)
-    before = rows[np.clip(after - 1, 0, len(rows) - 1)]
-    before_time = time[np.clip(after - 1, 0, len(rows) - 1)]
-    after = np.clip(after, 0, len(rows) - 1)
-    share = (place - place[before]) / np.maximum(place[rows[after]] - place[before], 1)
-    gap = arrival[rows[after]] - arrival[before]
-    into = arrival - arrival[before]
-    by_clock = (gap > 0) & (into >= 0) & (into <= gap)
-    share = np.where(by_clock, into / np.where(gap > 0, gap, 1), share)
-    result: OffsetArray = before_time + np.rint(share * (time[after] - before_time)).astype(np.int64)
-    # Outside the stamped part only the recorder knows how long ago it was.
-    early, late = index < rows[0], index > rows[-1]
-    result[early] = time[0] - np.maximum(arrival[rows[0]] - arrival[early], 0)
-    result[late] = time[-1] + np.maximum(arrival[late] - arrival[rows[-1]], 0)
-    result[rows] = time
+def _neighbours(
+    anchors: NDArray[np.intp], rows: NDArray[np.intp], n: int
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Index of the last anchor before each of n rows and of the first from it on."""
+    counted = np.zeros(n + 1, dtype=np.intp)
+    counted[anchors + 1] = 1
+    after = np.cumsum(counted)[rows]
+    return np.maximum(after - 1, 0), np.minimum(after, len(anchors) - 1)
+
+
+def _between(
+    time: OffsetArray, anchors: NDArray[np.intp], rows: NDArray[np.intp], stream: _Stream
+) -> OffsetArray:
+    """Times of some rows by their place between anchors whose times are known, shape (n,).
+
+    Between two anchors the recorder's clock says how far, where it went on from one to the
+    other: a vehicle sends in bursts, and the place in the stream alone would spread them evenly.
+    """
+    arrival, place = stream.arrival[rows], stream.place[rows]
+    before, after = _neighbours(anchors, rows, len(stream.arrival))
+    from_arrival = stream.arrival[anchors][before]
+    from_place = stream.place[anchors][before]
+    share = (place - from_place) / np.maximum(stream.place[anchors][after] - from_place, 1)
+    waited = stream.arrival[anchors][after] - from_arrival
+    into = arrival - from_arrival
+    told = (into >= 0) & (into <= waited) & (waited > 0)
+    share[told] = into[told] / waited[told]
+    result: OffsetArray = time[before]
+    result += np.rint(share * (time[after] - result)).astype(np.int64)
+    # Outside the anchors only the recorder knows how long ago it was.
+    early = rows < anchors[0]
+    result[early] = time[0] - np.maximum(stream.arrival[anchors[0]] - arrival[early], 0)
+    late = rows > anchors[-1]
+    result[late] = time[-1] + np.maximum(arrival[late] - stream.arrival[anchors[-1]], 0)
     return result

@@ -109,4 +109,4 @@ def _payloads(data: ByteArray, start: OffsetArray, length: ByteArray, width: int
 
 def text(column: NDArray[np.bytes_]) -> list[str]:
     """Fixed-width character field as strings, each ended by its first NUL."""
-    return [raw.split(b"\0", 1)[0].decode("utf-8", "replace") for raw in column.tolist()]
+    return [raw.partition(b"\0")[0].decode("utf-8", "replace") for raw in column.tolist()]

@@ -115,7 +115,6 @@ class _Candidates:
     end: OffsetArray
     payload: OffsetArray
     length: OffsetArray
-    header: OffsetArray
     message: NDArray[np.int32]
 
     def __getitem__(self, rows: MaskArray | NDArray[np.intp]) -> _Candidates:
@@ -160,9 +159,9 @@ def scan(
         loose = _chained(data, found[~good], sound)
         sound = sound[sound.start < stop]
         loose = loose[loose.start < stop]
-        kept = _frames_of(data, sound)
-        seen[(kept.system.astype(np.uint16) << 8) | kept.component] = True
-        parts.append(kept[is_wanted[kept.message]])
+        system = _sequence_at(sound) + 1
+        seen[(data[system].astype(np.uint16) << 8) | data[system + 1]] = True
+        parts.append(_frames_of(data, sound[is_wanted[sound.message]]))
         total += len(sound.start) + len(loose.start)
         verified_total += len(sound.start)
         bad += int(_lookup(is_wanted, loose.message, default=False).sum())
@@ -203,13 +202,13 @@ def _candidates(data: ByteArray, low: int, high: int) -> _Candidates:
     end = payload + length + _CHECKSUM_SIZE + _SIGNATURE_SIZE * (flags & _SIGNED)
     # A frame with flags that this reader does not know must not be decoded (MAVLink guide).
     whole = (end <= size) & (flags <= _SIGNED)
-    start, second, header = start[whole], second[whole], header[whole]
-    at = payload[whole] - np.where(second, 3, 1)
+    start, second, payload = start[whole], second[whole], payload[whole]
+    at = payload - np.where(second, 3, 1)
     message = data[at].astype(np.int32)
     wide = np.flatnonzero(second)
     message[wide] |= data[at[wide] + 1].astype(np.int32) << 8
     message[wide] |= data[at[wide] + 2].astype(np.int32) << 16
-    return _Candidates(start, end[whole], payload[whole], length[whole], header, message)
+    return _Candidates(start, end[whole], payload, length[whole], message)
 
 
 def _lookup(
@@ -230,10 +229,9 @@ def _verified(data: ByteArray, found: _Candidates, crc_extra: NDArray[np.int16])
     some = found[known]
     low = int(some.start[0])
     region = data[low : int(some.end.max())]
-    after_magic = some.payload - some.header + 1
-    computed = checksums(
-        region, after_magic - low, some.header - 1 + some.length, extra[known].astype(np.uint8)
-    )
+    covered = some.start + STAMP_SIZE + 1
+    size = some.payload + some.length - covered
+    computed = checksums(region, covered - low, size, extra[known].astype(np.uint8))
     result[known] = computed == _checksum_sent(data, some)
     return result
 
@@ -266,11 +264,11 @@ def _chained(data: ByteArray, doubtful: _Candidates, sound: _Candidates) -> _Can
 
 def _disjoint(start: OffsetArray, end: OffsetArray) -> NDArray[np.intp]:
     """Rows left when, going through the sorted spans, each one that overlaps a kept one goes."""
-    following = np.searchsorted(start, end, side="left")
     rows = np.arange(len(start), dtype=np.intp)
-    breaks = np.flatnonzero(following != rows + 1)
-    if not len(breaks):
+    if (start[1:] >= end[:-1]).all():
         return rows
+    following = np.searchsorted(start, end, side="left")
+    breaks = np.flatnonzero(following != rows + 1)
     runs = []
     row = 0
     for last in breaks.tolist():
@@ -281,20 +279,26 @@ def _disjoint(start: OffsetArray, end: OffsetArray) -> NDArray[np.intp]:
     return np.concatenate(runs)
 
 
+def _sequence_at(found: _Candidates) -> OffsetArray:
+    """Offset of the sequence number; the system and the component come after it."""
+    second = found.payload - found.start == STAMP_SIZE + _HEADER_V2
+    return found.payload - np.where(second, 6, 4)
+
+
 def _frames_of(data: ByteArray, found: _Candidates) -> Frames:
-    header = found.payload - np.where(found.header == _HEADER_V2, 6, 4)
     if len(data) < STAMP_SIZE:
         arrival = np.zeros(0, dtype=np.int64)
     else:
         times = np.ndarray((len(data) - STAMP_SIZE + 1,), ">u8", data, strides=(1,))
         arrival = times[found.start].astype(np.int64)
+    sequence = _sequence_at(found)
     return Frames(
         payload=found.payload,
         length=found.length.astype(np.uint8),
         message=found.message,
-        system=data[header + 1],
-        component=data[header + 2],
-        sequence=data[header],
+        system=data[sequence + 1],
+        component=data[sequence + 2],
+        sequence=data[sequence],
         checksum=_checksum_sent(data, found),
         arrival=arrival,
     )

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from magcomp.log.columns import Message, Table, text
-from magcomp.log.frames import MaskArray
 from magcomp.model import FloatArray, ParameterChange, ParameterHistory, Series
 
 STANDARD_GRAVITY = 9.80665

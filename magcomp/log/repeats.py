@@ -8,6 +8,9 @@ from magcomp.log.checksum import OffsetArray
 from magcomp.log.clock import NO_STAMP
 from magcomp.log.frames import Frames, MaskArray
 
+# Odd, so that no two keys are mixed alike; large, so that neighbouring ones end far apart.
+_MIX = np.int64(0x1E3779B97F4A7C15)
+
 
 def repeated(frames: Frames, stamp: OffsetArray) -> MaskArray:
     """Which frames of one vehicle are copies of an earlier one, shape (n,).
@@ -29,16 +32,15 @@ def repeated(frames: Frames, stamp: OffsetArray) -> MaskArray:
         | (frames.sequence.astype(np.int64) << 16)
         | frames.checksum
     )
-    copies = _seen_before(frames.arrival, content)
-    stamped = np.flatnonzero(stamp != NO_STAMP)
-    copied = _seen_before(stamp[stamped], content[stamped])
-    copies[stamped] |= copied
+    stamped = stamp != NO_STAMP
+    copies = _seen_before(np.where(stamped, stamp, frames.arrival), content)
+    copied = copies & stamped
     if copied.any():
-        bare = np.flatnonzero(stamp == NO_STAMP)
-        after = np.searchsorted(stamped, bare)
-        last = len(stamped) - 1
-        beside = copied[np.minimum(after, last)] & (after <= last)
-        beside |= copied[np.maximum(after - 1, 0)] & (after > 0)
+        anchors = np.flatnonzero(stamped)
+        bare = np.flatnonzero(~stamped)
+        after = np.searchsorted(anchors, bare)
+        beside = copied[anchors[np.minimum(after, len(anchors) - 1)]] & (after < len(anchors))
+        beside |= copied[anchors[np.maximum(after - 1, 0)]] & (after > 0)
         copies[bare] |= beside & _seen_before(content[bare], content[bare])
     return copies
 
@@ -46,16 +48,13 @@ def repeated(frames: Frames, stamp: OffsetArray) -> MaskArray:
 def _seen_before(key: OffsetArray, content: OffsetArray) -> MaskArray:
     """Which rows equal an earlier row in both arrays, shape (n,)."""
     result = np.zeros(len(key), dtype=bool)
-    order = np.argsort(key, kind="stable")
-    ordered = key[order]
-    same = ordered[1:] == ordered[:-1]
-    if not same.any():
+    # Equal rows have equal mixtures; sorting those alone is fast and nearly always settles it.
+    mixture = key * _MIX + content
+    ordered = np.sort(mixture)
+    doubtful = ordered[1:][ordered[1:] == ordered[:-1]]
+    if not len(doubtful):
         return result
-    # Only rows that share their key need the full comparison.
-    among = np.zeros(len(key), dtype=bool)
-    among[1:] |= same
-    among[:-1] |= same
-    rows = np.sort(order[among])
+    rows = np.flatnonzero(np.isin(mixture, doubtful))
     ranked = rows[np.lexsort((content[rows], key[rows]))]
     twice = (key[ranked][1:] == key[ranked][:-1]) & (content[ranked][1:] == content[ranked][:-1])
     result[ranked[1:][twice]] = True
