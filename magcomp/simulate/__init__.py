@@ -1,1 +1,28 @@
-"""A vehicle to work on when there is none: ArduCopter 4.6's behaviour on MAVLink."""
+"""A vehicle to work on when there is none: ArduCopter 4.6's behaviour on MAVLink.
+
+Without a link and in no time: :func:`write_tlog`, or a :class:`Vehicle` that is
+given frames and time. On a link in real time: :func:`serve`.
+"""
+
+from magcomp.simulate.faults import Faults, FaultyLink, Machine
+from magcomp.simulate.programs import PROGRAMS, Scenario, scenario
+from magcomp.simulate.recording import record, write_tlog
+from magcomp.simulate.server import run, serve
+from magcomp.simulate.truth import Truth
+from magcomp.simulate.vehicle import Frame, Vehicle
+
+__all__ = [
+    "PROGRAMS",
+    "Faults",
+    "FaultyLink",
+    "Frame",
+    "Machine",
+    "Scenario",
+    "Truth",
+    "Vehicle",
+    "record",
+    "run",
+    "scenario",
+    "serve",
+    "write_tlog",
+]

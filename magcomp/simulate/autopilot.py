@@ -27,7 +27,7 @@ BOARD_ID = "magcomp simulated vehicle"
 
 _NO_INDEX = 65535
 _FORCE = 21196.0
-_LIST_PER_10_MS = 4
+_LIST_PER_10_MS = 8
 _MODES = {"stabilize": 0, "auto": 3, "guided": 4, "loiter": 5}
 
 

@@ -4,14 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
+from typing import Literal
 
 from magcomp.errors import UsageError
 from magcomp.simulate.flight import Flight
+from magcomp.simulate.mission import Mission
 from magcomp.simulate.motion import Program
 from magcomp.simulate.timeline import paper_turntable, sweep, turntable
-from magcomp.simulate.truth import Truth, draw_truth, on_the_papers_bench
+from magcomp.simulate.truth import BATTERY, PAPER_BENCH, Power, Truth, draw_truth
 
-STABILIZE, GUIDED, LOITER = 0, 4, 5
+Compensation = Literal["off", "wrong", "exact"]
+
+_STABILIZE, _AUTO, _LOITER = 0, 3, 5
+_STRONG = 9.0
 
 
 @dataclass(frozen=True)
@@ -22,50 +28,49 @@ class Scenario:
     ----------
     truth
         The vehicle.
-    program
-        What it does.
+    begin
+        Makes the programme; each vehicle that carries it out needs its own.
     mode
         ArduCopter's flight mode while it does it.
     """
 
     truth: Truth
-    program: Program
+    begin: Callable[[], Program]
     mode: int
 
 
-def _turntable(seed: int, calibrated: bool | None, wrong_motor: bool) -> Scenario:
-    truth = draw_truth(seed, "rig", calibrated=bool(calibrated), wrong_motor=wrong_motor)
-    return Scenario(truth, turntable(seed), STABILIZE)
+@dataclass(frozen=True)
+class _Recipe:
+    """What is usual for a programme."""
+
+    kind: str
+    calibrated: bool
+    mode: int
+    begin: Callable[[int], Program]
+    power: Power = BATTERY
+    strength: float | None = None
 
 
-def _paper(seed: int, calibrated: bool | None, wrong_motor: bool) -> Scenario:
-    truth = draw_truth(seed, "rig", calibrated=bool(calibrated), wrong_motor=wrong_motor)
-    return Scenario(on_the_papers_bench(truth), paper_turntable(), STABILIZE)
-
-
-def _sweep(seed: int, calibrated: bool | None, wrong_motor: bool) -> Scenario:
-    known = calibrated is not False
-    truth = draw_truth(seed, "sweep", calibrated=known, wrong_motor=wrong_motor)
-    return Scenario(truth, sweep(seed), STABILIZE)
-
-
-def _flight(seed: int, calibrated: bool | None, wrong_motor: bool) -> Scenario:
-    known = calibrated is not False
-    truth = draw_truth(seed, "flight", calibrated=known, wrong_motor=wrong_motor)
-    return Scenario(truth, Flight(seed), LOITER)
-
-
-PROGRAMS: Mapping[str, Callable[[int, bool | None, bool], Scenario]] = {
-    "turntable": _turntable,
-    "turntable_paper": _paper,
-    "sweep": _sweep,
-    "flight": _flight,
+_RECIPES: Mapping[str, _Recipe] = {
+    "turntable": _Recipe("rig", False, _STABILIZE, turntable),
+    "turntable_paper": _Recipe(
+        "rig", False, _STABILIZE, lambda _: paper_turntable(), power=PAPER_BENCH
+    ),
+    "sweep": _Recipe("sweep", True, _STABILIZE, sweep),
+    "flight": _Recipe("flight", True, _LOITER, Flight),
+    "mission": _Recipe("mission", True, _AUTO, lambda _: Mission(), strength=_STRONG),
 }
+
+PROGRAMS: tuple[str, ...] = tuple(_RECIPES)
 """What ``--program`` may name."""
 
 
 def scenario(
-    program: str, seed: int, *, calibrated: bool | None = None, wrong_motor: bool = False
+    program: str,
+    seed: int,
+    *,
+    calibrated: bool | None = None,
+    compensation: Compensation = "off",
 ) -> Scenario:
     """Draw the vehicle of a programme.
 
@@ -78,17 +83,26 @@ def scenario(
     calibrated
         Whether the exact offsets and soft iron are in force at boot; None takes what is usual:
         not on a turntable, else yes.
-    wrong_motor
-        Whether a wrong motor compensation is in force at boot.
+    compensation
+        The motor compensation in force at boot.
 
     Raises
     ------
     UsageError
         For a name that is no programme.
     """
-    if program not in PROGRAMS:
+    recipe = _RECIPES.get(program)
+    if recipe is None:
         raise UsageError(
             f"The simulated vehicle's programme must be one of {', '.join(PROGRAMS)}; "
             f"instead received {program!r}"
         )
-    return PROGRAMS[program](seed, calibrated, wrong_motor)
+    truth = draw_truth(
+        seed,
+        recipe.kind,
+        calibrated=recipe.calibrated if calibrated is None else calibrated,
+        compensation=compensation,
+        strength=recipe.strength,
+        power=recipe.power,
+    )
+    return Scenario(truth, partial(recipe.begin, seed), recipe.mode)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from magcomp.errors import OutputError
 from magcomp.simulate.ground import DEFAULT_RATES, Asker
-from magcomp.simulate.programs import scenario
+from magcomp.simulate.programs import Compensation, scenario
 from magcomp.simulate.truth import Truth
 from magcomp.simulate.vehicle import DEFAULT_START_UNIX_S, Frame, Vehicle
 
@@ -49,7 +49,7 @@ def write_tlog(
     program: str = "flight",
     seed: int = 1,
     calibrated: bool | None = None,
-    wrong_motor: bool = False,
+    compensation: Compensation = "off",
     parameters: Mapping[str, float] | None = None,
     rates: Mapping[int, float] = DEFAULT_RATES,
     start_unix_s: float = DEFAULT_START_UNIX_S,
@@ -60,7 +60,7 @@ def write_tlog(
     ----------
     path
         The .tlog; overwritten.
-    program, seed, calibrated, wrong_motor
+    program, seed, calibrated, compensation
         See :func:`magcomp.simulate.programs.scenario`.
     parameters
         Parameters that differ at boot, for example ``{"BATT_MONITOR": 0}``.
@@ -79,7 +79,7 @@ def write_tlog(
     OutputError
         Where the file cannot be written.
     """
-    chosen = scenario(program, seed, calibrated=calibrated, wrong_motor=wrong_motor)
+    chosen = scenario(program, seed, calibrated=calibrated, compensation=compensation)
     vehicle = Vehicle(chosen, start_unix_s=start_unix_s, parameters=parameters)
     try:
         with path.open("wb") as stream:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -62,6 +62,9 @@ class Power:
     resistance_ohm: float = 0.018
     capacity_ah: float = 8.0
 
+
+BATTERY = Power()
+"""What an ordinary quadrotor flies on."""
 
 PAPER_BENCH = Power(
     # 32 A at 200 per mille and 53 A at 300, nothing at 0: PAPER.md, Table 1.
@@ -131,7 +134,7 @@ class Truth:
     start_offset
         COMPASS_OFS of every compass where it is not.
     start_motor
-        A wrong COMPASS_MOT in force at boot with COMPASS_MOTCT 2; None for none.
+        COMPASS_MOT in force at boot with COMPASS_MOTCT 2; None for none.
     noise
         Standard deviation of one 10 Hz compass reading, mGauss.
     power
@@ -209,8 +212,9 @@ def draw_truth(
     kind: str,
     *,
     calibrated: bool,
-    wrong_motor: bool = False,
+    compensation: str = "off",
     strength: float | None = None,
+    power: Power = BATTERY,
 ) -> Truth:
     """Draw a vehicle.
 
@@ -222,10 +226,12 @@ def draw_truth(
         See :class:`Truth`.
     calibrated
         Whether it boots with its exact calibration, motors excepted.
-    wrong_motor
-        Whether a wrong motor compensation is in force at boot.
+    compensation
+        ``"off"``, ``"wrong"`` or ``"exact"``: the motor compensation in force at boot.
     strength
         Length of the interference vector, mGauss/A; drawn between 1.5 and 3.5 where None.
+    power
+        Battery and motors.
     """
     rng = np.random.default_rng([seed, 0])
     home = _HOMES[int(rng.integers(len(_HOMES)))]
@@ -243,7 +249,11 @@ def draw_truth(
         for _ in range(3)
     )
     start_offset = np.round(rng.uniform(-20, 20, 3), 2)
-    start_motor = np.round(rng.uniform(-3, 3, 3), 4)
+    start_motor = {
+        "off": None,
+        "wrong": np.round(rng.uniform(-3, 3, 3), 4),
+        "exact": -interference,
+    }[compensation]
     return Truth(
         seed=seed,
         kind=kind,
@@ -253,12 +263,7 @@ def draw_truth(
         compasses=(compasses[0], compasses[1], compasses[2]),
         calibrated=calibrated,
         start_offset=start_offset,
-        start_motor=start_motor if wrong_motor else None,
+        start_motor=start_motor,
         noise=1.2,
-        power=Power(),
+        power=power,
     )
-
-
-def on_the_papers_bench(truth: Truth) -> Truth:
-    """Put the same vehicle on the paper's rig."""
-    return replace(truth, power=PAPER_BENCH)

@@ -70,8 +70,8 @@ class Vehicle:
         system: int = 1,
     ) -> None:
         self.truth = scenario.truth
-        self._program = scenario.program
-        self._pilot = Pilot(scenario.program)
+        self._program = scenario.begin()
+        self._pilot = Pilot(self._program)
         self._mode = scenario.mode
         self._start_unix_s = start_unix_s
         self._store = ParameterStore({**initial_values(scenario.truth), **(parameters or {})})
