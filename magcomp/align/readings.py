@@ -1,0 +1,155 @@
+"""New readings of one compass, without repeats, gaps and stretches that cannot be used."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from magcomp.autopilot import ardupilot
+from magcomp.errors import MissingDataError
+from magcomp.model import (
+    CURRENT,
+    THROTTLE,
+    BoolArray,
+    Correction,
+    FloatArray,
+    InForce,
+    Readings,
+    Recording,
+    Series,
+)
+
+PARAMETER_SETTLE_S = 1.5
+"""A changed compass parameter is in force somewhere within this time of its report."""
+
+ARMED_ENOUGH_S = 30.0
+"""With this much armed time, disarmed time (carried about, parked on steel) is left out."""
+
+_REGRESSOR = {
+    ardupilot.MotorCompensation.OFF: None,
+    ardupilot.MotorCompensation.THROTTLE: THROTTLE,
+    ardupilot.MotorCompensation.CURRENT: CURRENT,
+}
+
+
+def readings(
+    recording: Recording, compass: int, *, start: float = -np.inf, end: float = np.inf
+) -> Readings:
+    """New readings of one compass.
+
+    Parameters
+    ----------
+    recording
+        From any source.
+    compass
+        1, 2 or 3: the autopilot's priority order.
+    start, end
+        Seconds since the recording began.
+
+    Raises
+    ------
+    MissingDataError
+        Without this compass, without attitude, or with no reading left between start and end.
+    ParameterFileError
+        Where a compass parameter of the recording is not finite.
+
+    Notes
+    -----
+    ArduPilot repeats a reading until the next one (AUTOPILOTS.md, Timing): only changes are new.
+    """
+    reported = recording.field.get(compass)
+    if reported is None:
+        raise MissingDataError(
+            f"{recording.source} must hold readings of compass {compass}; instead it holds "
+            f"{_list_compasses(recording)}"
+        )
+    if recording.attitude is None or len(recording.attitude) < 2:
+        raise MissingDataError(
+            f"{recording.source} must hold the vehicle's attitude (message ATTITUDE); "
+            "instead it holds none, and gravity cannot be known without it"
+        )
+    keep = _is_new(reported.value)
+    keep &= (reported.time >= start) & (reported.time <= end)
+    keep &= _away_from(reported.time, ardupilot.calibration_changes(recording.parameters))
+    keep &= ~_in_gap(reported.time, recording.attitude.time)
+    keep &= _usable_state(reported.time, recording.armed)
+    if not keep.any():
+        raise MissingDataError(
+            f"{recording.source} must hold usable readings of compass {compass} in the time "
+            f"asked for; instead all {len(reported)} were repeats, gaps or outside it"
+        )
+    time = reported.time[keep]
+    in_force, stretch_starts = _corrections(recording, compass)
+    return Readings(
+        compass=compass,
+        time=time,
+        reported=_mend_truncation(reported.value[keep]),
+        stretch=np.searchsorted(stretch_starts, time, side="right").astype(np.intp),
+        in_force=in_force,
+        attitude=Series(recording.attitude.time, np.unwrap(recording.attitude.value, axis=0)),
+    )
+
+
+def _list_compasses(recording: Recording) -> str:
+    present = sorted(recording.field)
+    return f"compass {', '.join(map(str, present))}" if present else "no compass at all"
+
+
+def _is_new(value: FloatArray) -> BoolArray:
+    changed = np.any(np.diff(value, axis=0) != 0.0, axis=1)
+    return np.concatenate([[True], changed])
+
+
+def _away_from(time: FloatArray, moments: tuple[float, ...]) -> BoolArray:
+    keep = np.ones(len(time), dtype=bool)
+    for moment in moments:
+        keep &= np.abs(time - moment) > PARAMETER_SETTLE_S
+    return keep
+
+
+def _in_gap(time: FloatArray, known: FloatArray) -> BoolArray:
+    """Whether the neighbours in ``known`` stand too far apart to interpolate between."""
+    after = np.clip(np.searchsorted(known, time), 1, len(known) - 1)
+    width = known[after] - known[after - 1]
+    limit = max(0.5, 2.5 * float(np.median(np.diff(known))))
+    outside = (time < known[0] - limit) | (time > known[-1] + limit)
+    return np.asarray((width > limit) | outside)
+
+
+def _usable_state(time: FloatArray, armed: Series | None) -> BoolArray:
+    """Armed time where there is enough of it, else all time."""
+    everything = np.ones(len(time), dtype=bool)
+    if armed is None or len(armed) < 2:
+        return everything
+    state = armed.value[np.clip(np.searchsorted(armed.time, time, "right") - 1, 0, None)] > 0.5
+    seconds = float(np.sum(np.diff(armed.time) * armed.value[:-1]))
+    return np.asarray(state) if seconds >= ARMED_ENOUGH_S and state.any() else everything
+
+
+def _mend_truncation(value: FloatArray) -> FloatArray:
+    """Undo the mean of the firmware's cut towards zero when it casts to int16."""
+    return np.where(value == np.trunc(value), value + 0.5 * np.sign(value), value)
+
+
+def _corrections(recording: Recording, compass: int) -> tuple[tuple[InForce, ...], FloatArray]:
+    """Corrections in force, oldest first, and the moments from which all but the first hold."""
+    moments = [-np.inf, *ardupilot.calibration_changes(recording.parameters)]
+    in_force: list[InForce] = []
+    starts: list[float] = []
+    previous: ardupilot.Calibration | None = None
+    for moment in moments:
+        calibration = ardupilot.calibration_at(recording.parameters, compass, moment)
+        if previous is not None and calibration.same_as(previous):
+            continue
+        previous = calibration
+        in_force.append(
+            InForce(
+                correction=Correction(
+                    offset=calibration.offset,
+                    soft_iron=calibration.scale * calibration.soft_iron,
+                    motor=calibration.motor,
+                ),
+                regressor=_REGRESSOR[calibration.compensation],
+            )
+        )
+        starts.append(moment)
+    return tuple(in_force), np.array(starts[1:])

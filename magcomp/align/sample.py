@@ -1,0 +1,117 @@
+"""Readings at given lags: gravity, control quantity and raw field at the moment of measurement."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from magcomp.errors import MissingDataError
+from magcomp.geometry import gravity_direction
+from magcomp.model import Control, FloatArray, Lags, Readings, Samples, Series
+
+_RATE_STEP_S = 0.05
+
+
+def sample(
+    readings: Readings, control: Control, in_force: Mapping[str, Control], lags: Lags
+) -> Samples:
+    """Samples of one compass at given lags.
+
+    Parameters
+    ----------
+    readings
+        From :func:`magcomp.align.readings`.
+    control
+        The regressor.
+    in_force
+        Control quantities by kind, to undo the motor corrections that were in force.
+    lags
+        Of the field behind the attitude and of the control quantity behind the field.
+
+    Raises
+    ------
+    MissingDataError
+        Where a motor correction was in force whose control quantity the recording lacks.
+
+    Notes
+    -----
+    raw = soft_iron⁻¹ · (corrected − MOT · u) − OFS, AUTOPILOTS.md "Undo".
+    """
+    measured = readings.time - lags.field
+    commanded = readings.time - lags.regressor
+    attitude = interpolate(readings.attitude, measured)
+    before = interpolate(readings.attitude, measured - _RATE_STEP_S)
+    after = interpolate(readings.attitude, measured + _RATE_STEP_S)
+    down = gravity_direction(attitude[:, 0], attitude[:, 1])
+    down_rate = (
+        gravity_direction(after[:, 0], after[:, 1]) - gravity_direction(before[:, 0], before[:, 1])
+    ) / (2 * _RATE_STEP_S)
+    raw, raw_rate = _undo(readings, in_force, commanded)
+    return Samples(
+        compass=readings.compass,
+        lags=lags,
+        time=readings.time,
+        raw=raw,
+        raw_rate=raw_rate,
+        present=_as_now(readings, raw, in_force, commanded),
+        attitude=attitude,
+        down=down,
+        down_rate=down_rate,
+        u=interpolate(control.series, commanded),
+        u_rate=_rate(control.series, commanded),
+    )
+
+
+def interpolate(series: Series, time: FloatArray) -> FloatArray:
+    """A series at other times, linearly; shape (n,) or (n, k)."""
+    if series.value.ndim == 1:
+        return np.asarray(np.interp(time, series.time, series.value))
+    return np.stack([np.interp(time, series.time, column) for column in series.value.T], axis=1)
+
+
+def _rate(series: Series, time: FloatArray) -> FloatArray:
+    later = interpolate(series, time + _RATE_STEP_S)
+    return np.asarray((later - interpolate(series, time - _RATE_STEP_S)) / (2 * _RATE_STEP_S))
+
+
+def _undo(
+    readings: Readings, controls: Mapping[str, Control], commanded: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Raw field and its change per second of regressor lag, both of shape (n, 3)."""
+    raw = np.empty_like(readings.reported)
+    raw_rate = np.zeros_like(raw)
+    for index, stretch in enumerate(readings.in_force):
+        rows = readings.stretch == index
+        if not rows.any():
+            continue
+        field = readings.reported[rows]
+        inverse = np.linalg.inv(stretch.correction.soft_iron)
+        if stretch.regressor is not None:
+            if stretch.regressor not in controls:
+                raise MissingDataError(
+                    f"A motor compensation by {stretch.regressor} was in force, so the log must "
+                    f"hold the {stretch.regressor}; instead it holds none"
+                )
+            series = controls[stretch.regressor].series
+            motor = stretch.correction.motor
+            field = field - np.multiply.outer(interpolate(series, commanded[rows]), motor)
+            # d/dlag of −MOT·u(t − lag) is +MOT·u̇.
+            raw_rate[rows] = np.multiply.outer(_rate(series, commanded[rows]), motor) @ inverse.T
+        raw[rows] = field @ inverse.T - stretch.correction.offset
+    return raw, raw_rate
+
+
+def _as_now(
+    readings: Readings, raw: FloatArray, controls: Mapping[str, Control], commanded: FloatArray
+) -> FloatArray:
+    """Every reading as the present correction would report it, shape (n, 3)."""
+    present = readings.in_force[-1]
+    field = readings.reported.copy()
+    rows = readings.stretch != len(readings.in_force) - 1
+    if rows.any():
+        u = np.zeros(int(rows.sum()))
+        if present.regressor is not None and present.regressor in controls:
+            u = interpolate(controls[present.regressor].series, commanded[rows])
+        field[rows] = present.correction.apply(raw[rows], u)
+    return field

@@ -1,0 +1,27 @@
+"""Samples → MotorFit: three ways the same number is found."""
+
+from magcomp.fit.auto import METHODS, best_form, fit, refit
+from magcomp.fit.ellipsoid import Ellipsoids, fit_ellipsoid, fit_ellipsoids
+from magcomp.fit.flight import Problem
+from magcomp.fit.folds import folds
+from magcomp.fit.line import line_through, orthogonal_line, paper_line, weighted_line
+from magcomp.fit.residual import departures, residuals, spread
+
+__all__ = [
+    "METHODS",
+    "Ellipsoids",
+    "Problem",
+    "best_form",
+    "departures",
+    "fit",
+    "fit_ellipsoid",
+    "fit_ellipsoids",
+    "folds",
+    "line_through",
+    "orthogonal_line",
+    "paper_line",
+    "refit",
+    "residuals",
+    "spread",
+    "weighted_line",
+]

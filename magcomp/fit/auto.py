@@ -1,0 +1,228 @@
+"""Which method, which form of the control quantity, and how much to leave free."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from magcomp.errors import FitRejectedError, MissingDataError, UsageError
+from magcomp.fit.flight import (
+    FIELD_LAG,
+    GROUPS,
+    REGRESSOR_LAG,
+    STRENGTH,
+    VERTICAL,
+    Problem,
+    correction_of,
+    estimate,
+    lags_of,
+)
+from magcomp.fit.folds import folds
+from magcomp.fit.levels import centres_of_flight, fit_levels, usable_levels, with_line
+from magcomp.fit.residual import residuals, spread
+from magcomp.fit.robust import Estimate
+from magcomp.fit.sweep import fit_sweep, is_still
+from magcomp.model import CORRECTION_SIZE, BoolArray, FloatArray, Lags, MotorFit, pack
+
+METHODS = ("auto", "sweep", "levels", "flight")
+
+WORTH = 1.1
+"""A more open fit must lower the unexplained field by this factor to be believed.
+
+A little is always gained: errors of the current move the readings along one direction, and a
+soft iron that shrinks that direction seems to fit better.
+"""
+
+CLEAR = 1.5
+"""Beyond this factor a look at held-out readings would only repeat what is plain."""
+
+_LEAST_READINGS = 60
+_MOST_FREE = len(GROUPS)
+_QUICK = 2
+
+
+def fit(problem: Problem, method: str = "auto") -> MotorFit:
+    """Fit one compass against one control quantity.
+
+    Parameters
+    ----------
+    problem
+        The data.
+    method
+        One of :data:`METHODS`.
+
+    Raises
+    ------
+    UsageError
+        For a method that does not exist.
+    MissingDataError
+        With too few readings.
+    FitRejectedError
+        Where the method asked for cannot work on these data.
+    """
+    if method not in METHODS:
+        raise UsageError(
+            f"The method must be one of {', '.join(METHODS)}; instead received {method}"
+        )
+    if len(problem.readings) < _LEAST_READINGS:
+        raise MissingDataError(
+            f"Compass {problem.readings.compass} must have at least {_LEAST_READINGS} new "
+            f"readings; instead it has {len(problem.readings)}"
+        )
+    samples = problem.sample(Lags())
+    if method == "sweep" or (method == "auto" and is_still(samples)):
+        return fit_sweep(problem)
+    if method in ("auto", "levels"):
+        rows, level = usable_levels(problem)
+        count = len(np.unique(level))
+        if count >= 2 and (method == "levels" or len(rows) > 0.4 * len(samples)):
+            return fit_levels(problem, rows, level)[0]
+        if method == "levels":
+            raise FitRejectedError(
+                "The method of levels needs turns about all axes at two or more steady levels of "
+                f"{problem.control.kind}; instead the log holds {count}"
+            )
+    return fit_flight(problem)
+
+
+def refit(problem: Problem, fit: MotorFit, keep: BoolArray) -> MotorFit:
+    """The same fit, same method and same freedom, from a part of the readings.
+
+    Parameters
+    ----------
+    problem, fit
+        What was fitted and what came out.
+    keep
+        The readings to use, shape (n,).
+    """
+    part = problem.where(keep)
+    if fit.method == "sweep":
+        return fit_sweep(part, lag=fit.lags.regressor)
+    if fit.method == "levels":
+        rows, level = usable_levels(part)
+        if len(np.unique(level)) >= 2:
+            return fit_levels(part, rows, level)[0]
+        return fit
+    start = np.concatenate(
+        [pack(fit.correction), [fit.strength, fit.vertical, fit.lags.field, fit.lags.regressor]]
+    )
+    found = estimate(part, _groups(fit), start=start, hold_lags=True, with_covariance=False)
+    return _updated(fit, found)
+
+
+def fit_flight(problem: Problem) -> MotorFit:
+    """Fit a flight, opening as many groups of parameters as the data deserve."""
+    found, free = _choose_freedom(problem)
+    lags = lags_of(found.parameters)
+    samples = problem.sample(lags)
+    std = np.sqrt(np.diag(found.covariance))
+    correction = correction_of(found)
+    bare = MotorFit(
+        compass=samples.compass,
+        method="flight",
+        why=_why(free),
+        regressor=problem.control.kind,
+        origin=problem.control.origin,
+        correction=correction,
+        covariance=found.covariance[:CORRECTION_SIZE, :CORRECTION_SIZE],
+        free=frozenset(GROUPS[:free]),
+        lags=lags,
+        lags_std=Lags(float(std[FIELD_LAG]), float(std[REGRESSOR_LAG])),
+        strength=float(found.parameters[STRENGTH]),
+        vertical=float(found.parameters[VERTICAL]),
+        noise=float(np.sqrt(np.mean(found.noise**2))),
+        levels=(),
+        line=None,
+        u_low=float(np.quantile(samples.u, 0.02)),
+        u_high=float(np.quantile(samples.u, 0.98)),
+        count=len(samples),
+    )
+    return with_line(bare, centres_of_flight(samples, bare))
+
+
+def _choose_freedom(problem: Problem) -> tuple[Estimate, int]:
+    """The least open fit that explains the field nearly as well as the most open one.
+
+    The candidates are compared at the lags of the most open fit; the chosen one estimates its own.
+    """
+    opened = estimate(problem, _MOST_FREE, with_covariance=False)
+    least = _typical(opened.noise)
+    start = opened.parameters
+    for free in range(1, _MOST_FREE):
+        tried = estimate(
+            problem, free, start=start, hold_lags=True, with_covariance=False, rounds=_QUICK
+        )
+        if _typical(tried.noise) <= WORTH * least:
+            return estimate(problem, free, start=tried.parameters), free
+    doubtful = _typical(tried.noise) < CLEAR * least
+    if doubtful and not _pays_on_unseen(problem, tried, opened):
+        return estimate(problem, _MOST_FREE - 1, start=tried.parameters), _MOST_FREE - 1
+    return estimate(problem, _MOST_FREE, start=start), _MOST_FREE
+
+
+def _typical(noise: FloatArray) -> float:
+    return float(np.exp(np.mean(np.log(noise))))
+
+
+def _pays_on_unseen(problem: Problem, closed: Estimate, opened: Estimate) -> bool:
+    """Whether the open fit also predicts held-out readings better."""
+    fold = folds(problem.readings.time)
+    scores = []
+    for found, free in ((closed, _MOST_FREE - 1), (opened, _MOST_FREE)):
+        left = []
+        for index in range(int(fold.max()) + 1):
+            part = estimate(
+                problem.where(fold != index),
+                free,
+                start=found.parameters,
+                hold_lags=True,
+                with_covariance=False,
+            )
+            unseen = problem.where(fold == index).sample(lags_of(found.parameters))
+            left.append(
+                residuals(
+                    unseen,
+                    correction_of(part),
+                    float(part.parameters[STRENGTH]),
+                    float(part.parameters[VERTICAL]),
+                )
+            )
+        scores.append(spread(np.concatenate(left)))
+    return scores[1] < scores[0]
+
+
+def _why(free: int) -> str:
+    if free == 1:
+        return "the calibration in force explains the field but for the motors"
+    opened = {2: "offsets", 3: "offsets and soft-iron diagonal", 4: "offsets and soft iron"}[free]
+    return f"the calibration in force does not explain the field: {opened} were fitted too"
+
+
+def _groups(fit: MotorFit) -> int:
+    return sum(1 for group in GROUPS if group in fit.free)
+
+
+def _updated(fit: MotorFit, found: Estimate) -> MotorFit:
+    return replace(
+        fit,
+        correction=correction_of(found),
+        strength=float(found.parameters[STRENGTH]),
+        vertical=float(found.parameters[VERTICAL]),
+    )
+
+
+def best_form(problems: Sequence[Problem]) -> Problem:
+    """Of several forms of one control quantity the one that explains the field best.
+
+    Parameters
+    ----------
+    problems
+        The same readings against each form; at least one.
+    """
+    if len(problems) == 1:
+        return problems[0]
+    if is_still(problems[0].sample(Lags())):
+        return min(problems, key=lambda p: fit_sweep(p).noise)
+    return min(problems, key=lambda p: estimate(p, _MOST_FREE, with_covariance=False).cost)

@@ -1,0 +1,217 @@
+"""The paper's method: turns at constant control quantities, and the line through the centres.
+
+Readings at steady control quantities are grouped into levels. One soft-iron
+shape is shared by all levels and every level has a centre of its own
+(ellipsoid.py); the centres lie on a line in space (line.py), and the position
+along it, regressed on the control quantity, gives the offset at any control
+quantity (PAPER.md, "The algorithm").
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from magcomp.fit.ellipsoid import Ellipsoids, fit_ellipsoids
+from magcomp.fit.flight import BLOCK_S, Problem
+from magcomp.fit.line import line_through
+from magcomp.fit.robust import time_blocks
+from magcomp.fit.steady import steady_levels
+from magcomp.model import (
+    CORRECTION_SIZE,
+    MOTOR,
+    OFFSET,
+    SOFT_IRON,
+    BoolArray,
+    Correction,
+    FloatArray,
+    IntArray,
+    Lags,
+    Level,
+    Line,
+    MotorFit,
+    Samples,
+    symmetric,
+)
+
+LEAST_COVERAGE = 0.03
+"""Least eigenvalue of the mean outer product of directions; 1/3 for a full sphere, 0 for a turn
+about one axis."""
+
+_U_FLOOR = 1e-3
+
+
+def usable_levels(problem: Problem) -> tuple[Samples, IntArray]:
+    """Readings that belong to a level turned through enough attitudes, and their level.
+
+    Returns
+    -------
+    Samples
+        Only the rows of usable levels.
+    ndarray, shape (n,)
+        Level 0 … k − 1 of each row, in order of the control quantity; empty where none is usable.
+    """
+    samples = problem.sample(Lags(0.0, 0.0))
+    level = steady_levels(problem.control.series, samples)
+    kept = [k for k in range(int(level.max(initial=-1)) + 1) if _covered(samples, level == k)]
+    rows = np.isin(level, kept)
+    return samples.where(rows), np.searchsorted(np.array(kept, dtype=np.intp), level[rows])
+
+
+def _covered(samples: Samples, rows: BoolArray) -> bool:
+    """Whether the field came from enough directions of the body to hold an ellipsoid's centre."""
+    if np.count_nonzero(rows) < 60:
+        return False
+    down = samples.down[rows]
+    return bool(np.linalg.eigvalsh(down.T @ down / len(down))[0] > LEAST_COVERAGE)
+
+
+def fit_levels(
+    problem: Problem, samples: Samples, level: IntArray, *, start: Ellipsoids | None = None
+) -> tuple[MotorFit, Ellipsoids]:
+    """Ellipsoids of one shape, and the weighted line through their centres.
+
+    Parameters
+    ----------
+    problem
+        The compass and its control quantity.
+    samples, level
+        From :func:`usable_levels`; at least two levels.
+    start
+        Where the ellipsoids begin.
+    """
+    blocks = time_blocks(samples.time, BLOCK_S)
+    ellipsoids = fit_ellipsoids(
+        samples.raw, level, problem.earth.strength, blocks=blocks, start=start
+    )
+    levels = tuple(
+        _level(samples, level == k, ellipsoids, k) for k in range(len(ellipsoids.centres))
+    )
+    line = line_through(levels)
+    slope = line.slope * line.direction
+    origin = line.point + line.intercept * line.direction
+    correction = Correction(
+        offset=-origin, soft_iron=ellipsoids.soft_iron, motor=-ellipsoids.soft_iron @ slope
+    )
+    corrected = correction.apply(samples.raw, samples.u)
+    along_gravity = np.einsum("ij,ij->i", corrected, samples.down)
+    fit = MotorFit(
+        compass=samples.compass,
+        method="levels",
+        why=f"the vehicle was turned at {len(levels)} steady levels of {problem.control.kind}",
+        regressor=problem.control.kind,
+        origin=problem.control.origin,
+        correction=correction,
+        covariance=_covariance(ellipsoids, levels, line, correction),
+        free=frozenset({"motor", "offset", "diagonal", "off-diagonal"}),
+        lags=Lags(np.nan, np.nan),
+        lags_std=Lags(np.nan, np.nan),
+        strength=ellipsoids.strength,
+        vertical=float(np.median(along_gravity)),
+        noise=ellipsoids.noise,
+        levels=levels,
+        line=line,
+        u_low=min(lv.u for lv in levels),
+        u_high=max(lv.u for lv in levels),
+        count=len(samples),
+    )
+    return fit, ellipsoids
+
+
+def _level(samples: Samples, rows: BoolArray, ellipsoids: Ellipsoids, index: int) -> Level:
+    u = samples.u[rows]
+    return Level(
+        u=float(u.mean()),
+        u_std=float(np.hypot(u.std() / np.sqrt(len(u)), _U_FLOOR)),
+        centre=ellipsoids.centres[index],
+        covariance=ellipsoids.centre_covariance(index),
+        count=len(u),
+    )
+
+
+def _covariance(
+    ellipsoids: Ellipsoids, levels: tuple[Level, ...], line: Line, correction: Correction
+) -> FloatArray:
+    """Covariance of the 12 correction parameters, by the linear map from shape and centres.
+
+    Notes
+    -----
+    offset and slope are weighted means of the centres, the weights of the line taken as given;
+    motor = −D · slope carries the doubt of D and of the slope.
+    """
+    count = len(levels)
+    u = np.array([level.u for level in levels])
+    weight = 1.0 / np.array([np.trace(level.covariance) for level in levels])
+    design = np.column_stack([np.ones(count), u])
+    gain = np.linalg.solve(design.T @ (design * weight[:, None]), (design * weight[:, None]).T)
+    slope = line.slope * line.direction
+    shape = correction.soft_iron
+    jacobian = np.zeros((CORRECTION_SIZE, 6 + 3 * count))
+    jacobian[SOFT_IRON, :6] = np.eye(6)
+    for axis in range(6):
+        jacobian[MOTOR, axis] = -symmetric(np.eye(6)[axis]) @ slope
+    for index in range(count):
+        columns = slice(6 + 3 * index, 9 + 3 * index)
+        jacobian[OFFSET, columns] = -gain[0, index] * np.eye(3)
+        jacobian[MOTOR, columns] = -gain[1, index] * shape
+    covariance = jacobian @ ellipsoids.covariance @ jacobian.T
+    # Centres off the line by more than their errors say the line is only nearly true.
+    excess = max(1.0, line.chi2 / line.degrees) if line.degrees else 1.0
+    return np.asarray(covariance * excess)
+
+
+def centres_of_flight(samples: Samples, fit: MotorFit, bins: int = 8) -> tuple[Level, ...]:
+    """Centres at several control quantities from a flight, by what strength and dip leave over.
+
+    In each bin of the control quantity the corrected field may be off by one body-fixed vector
+    δ. To first order r₁ = along · δ and r₂ = down · δ; the bin's centre is the fitted one less
+    D⁻¹ δ.
+    """
+    edges = np.unique(np.quantile(samples.u, np.linspace(0.0, 1.0, bins + 1)))
+    bin_of = np.clip(np.searchsorted(edges, samples.u, side="right") - 1, 0, len(edges) - 2)
+    corrected = fit.correction.apply(samples.raw, samples.u)
+    size = np.linalg.norm(corrected, axis=1)
+    directions = np.stack([corrected / size[:, None], samples.down], axis=1)
+    vertical = np.einsum("ij,ij->i", corrected, samples.down)
+    left = np.stack([size - fit.strength, vertical - fit.vertical], axis=1)
+    inverse = np.linalg.inv(fit.correction.soft_iron)
+    levels = []
+    for index in range(len(edges) - 1):
+        rows = bin_of == index
+        if np.count_nonzero(rows) < 20:
+            continue
+        delta, covariance = _leftover(directions[rows], left[rows], fit.noise)
+        u = samples.u[rows]
+        levels.append(
+            Level(
+                u=float(u.mean()),
+                u_std=float(np.hypot(u.std() / np.sqrt(len(u)), _U_FLOOR)),
+                centre=fit.correction.centre(float(u.mean())) + inverse @ delta,
+                covariance=inverse @ covariance @ inverse.T,
+                count=int(np.count_nonzero(rows)),
+            )
+        )
+    return tuple(levels)
+
+
+def _leftover(
+    directions: FloatArray, left: FloatArray, noise: float
+) -> tuple[FloatArray, FloatArray]:
+    """Robust vector δ and its covariance from directions (n, 2, 3) and residuals (n, 2)."""
+    flat, value = directions.reshape(-1, 3), left.reshape(-1)
+    weight = np.ones(len(value))
+    ridge = (noise / 100.0) ** 2 * np.eye(3)
+    for _ in range(5):
+        normal = flat.T @ (flat * weight[:, None]) + ridge
+        delta = np.linalg.solve(normal, flat.T @ (weight * value))
+        weight = 1 / np.sqrt(1 + ((value - flat @ delta) / (2 * noise)) ** 2)
+    # Errors stay alike for about a second of a 10 Hz flight: ten readings count as one.
+    return np.asarray(delta), np.asarray(np.linalg.inv(normal) * noise**2 * 10.0)
+
+
+def with_line(fit: MotorFit, levels: tuple[Level, ...]) -> MotorFit:
+    """The fit with these centres and the line through them; unchanged below two levels."""
+    if len(levels) < 2:
+        return fit
+    return replace(fit, levels=levels, line=line_through(levels))

@@ -1,0 +1,239 @@
+"""Robust non-linear least squares with priors, noise levels and honest covariance.
+
+The estimate minimises
+
+    Σ ρ(r / σ) + ½ (p − p₀)ᵀ P (p − p₀),    ρ the soft-L1 loss,
+
+by Levenberg–Marquardt on reweighted residuals, σ re-estimated per kind of
+residual from the residuals themselves. Residuals of a flight are correlated in
+time (the current is known only now and then), so the covariance is built from
+sums over blocks of time, not from single readings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from magcomp.model import BoolArray, FloatArray, IntArray
+
+ROUNDS = 6
+"""σ is re-estimated this often at most."""
+
+LOSS_SCALE = 2.0
+"""Residuals beyond this many σ count linearly."""
+
+_MAD_TO_STD = 1.4826
+_STEPS = 12
+_DAMPING_START = 1e-6
+_DAMPING_MOST = 1e3
+_NEGLIGIBLE = 1e-3
+"""A gain of log-likelihood that no digit of the answer notices."""
+
+Residuals = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+"""Parameters (k,) → residuals (n, g) of g kinds and their derivatives (n, g, k)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Prior:
+    """What is known before the data: a mean and a width per parameter.
+
+    Attributes
+    ----------
+    mean, width
+        Shape (k,). Width 0 holds a parameter; infinity leaves it to the data.
+    """
+
+    mean: FloatArray
+    width: FloatArray
+
+    @property
+    def precision(self) -> FloatArray:
+        """1 / width², 0 where a parameter is held (it does not move) or free."""
+        held = self.width == 0.0
+        return np.where(held, 0.0, 1.0 / np.where(held, 1.0, self.width) ** 2)
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """A solution.
+
+    Attributes
+    ----------
+    parameters
+        Shape (k,).
+    covariance
+        Shape (k, k); rows and columns of held parameters are zero.
+    noise
+        σ of each kind of residual, shape (g,).
+    cost
+        Σ ρ of the data at the solution, with each kind's log σ: comparable between regressors.
+    residuals
+        Shape (n, g).
+    """
+
+    parameters: FloatArray
+    covariance: FloatArray
+    noise: FloatArray
+    cost: float
+    residuals: FloatArray
+
+
+def solve(
+    residuals: Residuals,
+    start: FloatArray,
+    prior: Prior,
+    *,
+    blocks: IntArray | None = None,
+    doubt: Prior | None = None,
+    noise_floor: float = 0.2,
+    noise: FloatArray | None = None,
+    rounds: int = ROUNDS,
+    feasible: Callable[[FloatArray], bool] = lambda _: True,
+) -> Estimate:
+    """Find the most probable parameters.
+
+    Parameters
+    ----------
+    residuals
+        The model.
+    start
+        Where to begin, shape (k,); held parameters stay there.
+    prior
+        Means and widths.
+    blocks
+        Block number of each row, shape (n,), ascending; rows of a block are taken to share
+        their error. None skips the covariance, for use inside a search.
+    doubt
+        The prior the covariance is made with, where it differs: parameters held in the search
+        may still be uncertain. The same prior by default.
+    noise_floor
+        Least σ, in the unit of the residuals (rounding of the readings).
+    noise
+        σ per kind to be used as they are, shape (g,).
+    rounds
+        How often σ is re-estimated at most; few in a search that only compares.
+    feasible
+        Steps to parameters for which this is false are not taken.
+    """
+    moving = prior.width > 0.0
+    parameters = start.astype(np.float64)
+    values, slopes = residuals(parameters)
+    scale = _spread(values, noise_floor) if noise is None else noise
+    for _ in range(rounds if noise is None else 1):
+        parameters, values, slopes = _descend(
+            residuals, parameters, values, slopes, prior, moving, scale, feasible
+        )
+        if noise is not None:
+            break
+        previous, scale = scale, _spread(values, noise_floor)
+        if np.all(np.abs(scale / previous - 1) < 0.02):
+            break
+    weights = _weights(values / scale) / scale**2
+    covariance = (
+        _covariance(values, slopes, weights, prior if doubt is None else doubt, blocks)
+        if blocks is not None
+        else np.zeros((len(parameters), len(parameters)))
+    )
+    return Estimate(
+        parameters=parameters,
+        covariance=covariance,
+        noise=scale,
+        cost=_loss(values / scale) + len(values) * float(np.sum(np.log(scale))),
+        residuals=values,
+    )
+
+
+def _spread(values: FloatArray, floor: float) -> FloatArray:
+    return np.maximum(_MAD_TO_STD * np.median(np.abs(values), axis=0), floor)
+
+
+def _weights(z: FloatArray) -> FloatArray:
+    return np.asarray(1.0 / np.sqrt(1.0 + (z / LOSS_SCALE) ** 2))
+
+
+def _loss(z: FloatArray) -> float:
+    return float(LOSS_SCALE**2 * np.sum(np.sqrt(1.0 + (z / LOSS_SCALE) ** 2) - 1.0))
+
+
+def _descend(
+    residuals: Residuals,
+    parameters: FloatArray,
+    values: FloatArray,
+    slopes: FloatArray,
+    prior: Prior,
+    moving: BoolArray,
+    scale: FloatArray,
+    feasible: Callable[[FloatArray], bool],
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Levenberg–Marquardt steps at fixed σ until they no longer help."""
+    precision = prior.precision[moving]
+
+    def objective(at: FloatArray, left: FloatArray) -> float:
+        away = (at - prior.mean)[moving]
+        return _loss(left / scale) + 0.5 * float(away @ (precision * away))
+
+    now = objective(parameters, values)
+    damping = _DAMPING_START
+    for _ in range(_STEPS):
+        weights = _weights(values / scale) / scale**2
+        design = slopes[:, :, moving].reshape(-1, int(moving.sum()))
+        weighted = design * weights.reshape(-1, 1)
+        hessian = design.T @ weighted + np.diag(precision)
+        gradient = weighted.T @ values.reshape(-1) + precision * (parameters - prior.mean)[moving]
+        progress = False
+        while damping < _DAMPING_MOST:
+            damped = hessian + damping * np.diag(np.diag(hessian) + 1e-12)
+            step = np.zeros_like(parameters)
+            step[moving] = -np.linalg.solve(damped, gradient)
+            if -float(gradient @ step[moving]) < _NEGLIGIBLE:
+                break
+            trial = parameters + step
+            if feasible(trial):
+                trial_values, trial_slopes = residuals(trial)
+                value = objective(trial, trial_values)
+                if value <= now:
+                    progress = now - value > _NEGLIGIBLE
+                    parameters, values, slopes, now = trial, trial_values, trial_slopes, value
+                    damping = max(damping * 0.1, _DAMPING_START)
+                    break
+            damping *= 10.0
+        if not progress:
+            break
+    return parameters, values, slopes
+
+
+def _covariance(
+    values: FloatArray,
+    slopes: FloatArray,
+    weights: FloatArray,
+    prior: Prior,
+    blocks: IntArray,
+) -> FloatArray:
+    """Sandwich covariance with scores summed over blocks, shrunk where blocks are few."""
+    moving = prior.width > 0.0
+    size = int(moving.sum())
+    design = slopes[:, :, moving]
+    flat = design.reshape(-1, size)
+    data = flat.T @ (flat * weights.reshape(-1, 1))
+    precision = np.diag(prior.precision[moving])
+    bread = np.linalg.inv(data + precision + 1e-12 * np.eye(size))
+    scores = np.einsum("ngi,ng,ng->ni", design, weights, values, optimize=True)
+    starts = np.flatnonzero(np.r_[True, np.diff(blocks) != 0])
+    per_block = np.add.reduceat(scores, starts, axis=0)
+    count = len(per_block)
+    meat = per_block.T @ per_block * (count / max(count - 1, 1))
+    # With few blocks the summed scores say little about each direction: lean on one common factor.
+    inflation = max(1.0, float(np.trace(np.linalg.pinv(data) @ meat)) / size)
+    trust = count / (count + 4.0 * size)
+    meat = trust * meat + (1 - trust) * inflation * data
+    covariance = np.zeros((len(moving), len(moving)))
+    covariance[np.ix_(moving, moving)] = bread @ (meat + precision) @ bread
+    return covariance
+
+
+def time_blocks(time: FloatArray, seconds: float) -> IntArray:
+    """Number of the block of ``seconds`` each moment falls into, shape (n,)."""
+    return np.asarray(np.floor((time - time[0]) / seconds), dtype=np.intp)

@@ -1,0 +1,179 @@
+"""The vehicle stands still and the control quantity changes: the field against it, directly."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from magcomp.errors import FitRejectedError
+from magcomp.fit.flight import (
+    BLOCK_S,
+    LAG_MEAN_S,
+    LAG_MOST_S,
+    LAG_WIDTH_S,
+    TRUSTED_OFFSET_MGAUSS,
+    TRUSTED_SOFT_IRON,
+    Problem,
+)
+from magcomp.fit.line import line_through
+from magcomp.fit.robust import Prior, solve, time_blocks
+from magcomp.fit.steady import steady_levels
+from magcomp.model import (
+    CORRECTION_SIZE,
+    MOTOR,
+    OFFSET,
+    SOFT_IRON,
+    Correction,
+    FloatArray,
+    Lags,
+    Level,
+    MotorFit,
+    Samples,
+)
+
+STILL_TILT_RAD = np.radians(5.0)
+"""A vehicle on its legs tilts less than this with its motors running."""
+
+STILL_SHARE = 0.02
+"""Standing still, the control quantity explains the field but for this share of its strength."""
+
+_START, _SLOPE, _LAG = slice(0, 3), slice(3, 6), 6
+_SIZE = 7
+
+
+def is_still(samples: Samples) -> bool:
+    """Whether the vehicle neither tilted nor turned.
+
+    The autopilot's own heading is no witness: the interference moves it. Standing still means
+    that the tilt stays and that a straight line in u explains the field.
+    """
+    middle = np.median(samples.attitude[:, :2], axis=0)
+    tilt = np.quantile(np.abs(samples.attitude[:, :2] - middle), 0.95, axis=0)
+    if np.any(tilt > STILL_TILT_RAD):
+        return False
+    design = np.column_stack([np.ones(len(samples)), samples.u])
+    line = np.linalg.lstsq(design, samples.raw, rcond=None)[0]
+    left = np.linalg.norm(samples.raw - design @ line, axis=1)
+    strength = float(np.median(np.linalg.norm(samples.present, axis=1)))
+    return bool(np.median(left) < STILL_SHARE * strength)
+
+
+def fit_sweep(problem: Problem, *, lag: float | None = None) -> MotorFit:
+    """Raw field = constant + slope · u(t − lag), robustly; MOT = −D · slope.
+
+    Parameters
+    ----------
+    problem
+        The compass and its control quantity.
+    lag
+        The regressor's lag where it is known; estimated otherwise.
+
+    Raises
+    ------
+    FitRejectedError
+        Where the control quantity does not change.
+
+    Notes
+    -----
+    PAPER.md 3 with the vehicle at rest: only the hard iron moves. AUTOPILOTS.md: "a slope g
+    found in raw space becomes MOT = −s · D · g".
+    """
+    begin = np.zeros(_SIZE)
+    begin[_LAG] = LAG_MEAN_S if lag is None else lag
+    at_start = problem.sample(Lags(0.0, float(begin[_LAG])))
+    if not np.ptp(at_start.u) > 0.0:
+        raise FitRejectedError(
+            f"The {problem.control.kind} must change during a sweep; instead it stayed at "
+            f"{at_start.u[0]:.2f}"
+        )
+    design = np.column_stack([np.ones(len(at_start)), at_start.u])
+    begin[:6] = np.linalg.lstsq(design, at_start.raw, rcond=None)[0].reshape(-1)
+    width = np.full(_SIZE, np.inf)
+    width[_LAG] = LAG_WIDTH_S if lag is None else 0.0
+    mean = begin.copy()
+
+    def residuals(parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
+        rows = problem.sample(Lags(0.0, float(parameters[_LAG])))
+        left = rows.raw - parameters[_START] - np.multiply.outer(rows.u, parameters[_SLOPE])
+        slopes = np.zeros((len(rows), 3, _SIZE))
+        for axis in range(3):
+            slopes[:, axis, axis] = -1.0
+            slopes[:, axis, 3 + axis] = -rows.u
+        slopes[:, :, _LAG] = rows.raw_rate + np.multiply.outer(rows.u_rate, parameters[_SLOPE])
+        return left, slopes
+
+    found = solve(
+        residuals,
+        begin,
+        Prior(mean, width),
+        blocks=time_blocks(problem.readings.time, BLOCK_S / 5),
+        feasible=lambda p: bool(abs(p[_LAG]) < LAG_MOST_S),
+    )
+    return _answer(problem, found.parameters, found.covariance, float(np.max(found.noise)))
+
+
+def _answer(
+    problem: Problem, parameters: FloatArray, covariance: FloatArray, noise: float
+) -> MotorFit:
+    present = problem.readings.in_force[-1].correction
+    shape, slope = present.soft_iron, parameters[_SLOPE]
+    samples = problem.sample(Lags(0.0, float(parameters[_LAG])))
+    correction = Correction(present.offset, shape, -shape @ slope)
+    full = np.zeros((CORRECTION_SIZE, CORRECTION_SIZE))
+    doubt = TRUSTED_SOFT_IRON**2 * float(slope @ slope) * np.eye(3)
+    full[MOTOR, MOTOR] = shape @ covariance[_SLOPE, _SLOPE] @ shape.T + doubt
+    full[OFFSET, OFFSET] = TRUSTED_OFFSET_MGAUSS**2 * np.eye(3)
+    full[SOFT_IRON, SOFT_IRON] = TRUSTED_SOFT_IRON**2 * np.eye(6)
+    corrected = correction.apply(samples.raw, samples.u)
+    levels = _levels(problem, samples, parameters, present, noise)
+    return MotorFit(
+        compass=samples.compass,
+        method="sweep",
+        why=f"the vehicle stood still while the {problem.control.kind} changed",
+        regressor=problem.control.kind,
+        origin=problem.control.origin,
+        correction=correction,
+        covariance=full,
+        free=frozenset({"motor"}),
+        lags=Lags(np.nan, float(parameters[_LAG])),
+        lags_std=Lags(np.nan, float(np.sqrt(covariance[_LAG, _LAG]))),
+        strength=float(np.median(np.linalg.norm(corrected, axis=1))),
+        vertical=float(np.median(np.einsum("ij,ij->i", corrected, samples.down))),
+        noise=noise,
+        levels=levels,
+        line=line_through(levels),
+        u_low=float(np.quantile(samples.u, 0.02)),
+        u_high=float(np.quantile(samples.u, 0.98)),
+        count=len(samples),
+    )
+
+
+def _levels(
+    problem: Problem,
+    samples: Samples,
+    parameters: FloatArray,
+    present: Correction,
+    noise: float,
+) -> tuple[Level, ...]:
+    """Mean raw field at each steady level, as a centre; the ends of the range where none is."""
+    moved = samples.raw - parameters[_START] - present.offset
+    level = steady_levels(problem.control.series, samples)
+    groups = [level == k for k in range(int(level.max(initial=-1)) + 1)]
+    if len(groups) < 2:
+        middle = np.median(samples.u)
+        groups = [samples.u <= middle, samples.u > middle]
+    levels = []
+    for rows in groups:
+        count = int(np.count_nonzero(rows))
+        if count == 0:
+            continue
+        u = samples.u[rows]
+        levels.append(
+            Level(
+                u=float(u.mean()),
+                u_std=float(np.hypot(u.std() / np.sqrt(count), 1e-3)),
+                centre=np.median(moved[rows], axis=0),
+                covariance=(noise**2 / count + 0.01) * np.eye(3),
+                count=count,
+            )
+        )
+    return tuple(levels)

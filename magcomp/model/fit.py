@@ -1,0 +1,314 @@
+"""What a fit found, with how sure it is, and what the judge makes of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from magcomp.model.recording import FloatArray, Vehicle
+from magcomp.model.samples import Correction, Lags
+
+CORRECTION_SIZE = 12
+"""Parameters of a correction: motor x y z, offset x y z, soft iron xx yy zz xy xz yz."""
+
+MOTOR, OFFSET, SOFT_IRON = slice(0, 3), slice(3, 6), slice(6, 12)
+_ROWS, _COLUMNS = np.array([0, 1, 2, 0, 0, 1]), np.array([0, 1, 2, 1, 2, 2])
+
+
+def pack(correction: Correction) -> FloatArray:
+    """A correction as its 12 parameters."""
+    return np.concatenate(
+        [correction.motor, correction.offset, correction.soft_iron[_ROWS, _COLUMNS]]
+    )
+
+
+def unpack(parameters: FloatArray) -> Correction:
+    """A correction from its 12 parameters."""
+    return Correction(
+        offset=parameters[OFFSET].copy(),
+        soft_iron=symmetric(parameters[SOFT_IRON]),
+        motor=parameters[MOTOR].copy(),
+    )
+
+
+def symmetric(six: FloatArray) -> FloatArray:
+    """Symmetric 3×3 matrix from xx, yy, zz, xy, xz, yz."""
+    matrix = np.empty((3, 3))
+    matrix[_ROWS, _COLUMNS] = six
+    matrix[_COLUMNS, _ROWS] = six
+    return matrix
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """The centre of the raw ellipsoid at one control quantity: a point of the paper's Fig. 4.
+
+    Attributes
+    ----------
+    u
+        Control quantity.
+    u_std
+        Standard error of its mean.
+    centre
+        mGauss, shape (3,).
+    covariance
+        mGauss², shape (3, 3).
+    count
+        Readings it rests on.
+    """
+
+    u: float
+    u_std: float
+    centre: FloatArray
+    covariance: FloatArray
+    count: int
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """The line in space the centres lie on.
+
+    Attributes
+    ----------
+    point
+        A point on the line, mGauss, shape (3,).
+    direction
+        Unit vector, shape (3,).
+    positions
+        Position of each centre along the line from ``point``, mGauss, shape (k,).
+    slope, intercept
+        position = intercept + slope · u, mGauss per unit and mGauss.
+    slope_std
+        Standard error of the slope.
+    rms
+        Distance of the centres from the line, mGauss.
+    straightness
+        Share of the centres' spread that lies along the line, 0 … 1.
+    chi2, degrees
+        Weighted squared distance of the centres from slope · u, and its degrees of freedom.
+    """
+
+    point: FloatArray
+    direction: FloatArray
+    positions: FloatArray
+    slope: float
+    intercept: float
+    slope_std: float
+    rms: float
+    straightness: float
+    chi2: float
+    degrees: int
+
+
+@dataclass(frozen=True, eq=False)
+class MotorFit:
+    """How one compass moves with one control quantity.
+
+    Attributes
+    ----------
+    compass
+        1, 2 or 3.
+    method
+        ``"sweep"``, ``"levels"`` or ``"flight"``.
+    why
+        In words, why this method and these free parameters.
+    regressor
+        ``"current"`` or ``"throttle"``.
+    origin
+        In words, what the regressor was made of.
+    correction
+        What to write.
+    covariance
+        Of the 12 parameters of :func:`pack`, shape (12, 12).
+    free
+        Which groups the data determined: a subset of ``{"motor", "offset", "diagonal",
+        "off-diagonal"}``.
+    lags, lags_std
+        The delays and their standard errors; NaN where a method cannot see one.
+    strength, vertical
+        Earth field as found, mGauss; ``vertical`` is its downward part.
+    noise
+        Robust spread of the residuals, mGauss.
+    levels, line
+        The centres and the line through them; no line through fewer than two.
+    u_low, u_high
+        Range of the control quantity the data cover (2nd and 98th percentile).
+    count
+        Readings used.
+    """
+
+    compass: int
+    method: str
+    why: str
+    regressor: str
+    origin: str
+    correction: Correction
+    covariance: FloatArray
+    free: frozenset[str]
+    lags: Lags
+    lags_std: Lags
+    strength: float
+    vertical: float
+    noise: float
+    levels: tuple[Level, ...]
+    line: Line | None
+    u_low: float
+    u_high: float
+    count: int
+
+    @property
+    def interference(self) -> FloatArray:
+        """Field the motors add to the corrected field, mGauss per unit, shape (3,)."""
+        return -self.correction.motor
+
+    @property
+    def interference_std(self) -> FloatArray:
+        """Standard errors of :attr:`interference`, shape (3,)."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)[MOTOR]))
+
+
+class Grade(StrEnum):
+    """The judge's word."""
+
+    GOOD = "good"
+    MARGINAL = "marginal"
+    REJECTED = "rejected"
+
+
+@dataclass(frozen=True)
+class HeadingError:
+    """Largest heading error over a full turn at one control quantity, degrees.
+
+    Attributes
+    ----------
+    u
+        Control quantity.
+    before
+        With the correction that was in force, measured against the fit.
+    after
+        With the fitted correction, expected (median of what the uncertainty allows).
+    p95
+        With the fitted correction, not exceeded with 95 % probability.
+    """
+
+    u: float
+    before: float
+    after: float
+    p95: float
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """What the data cover.
+
+    Attributes
+    ----------
+    sphere
+        Share of the sphere of directions of the field seen in body axes, 0 … 1.
+    heading
+        Share of the full turn seen, 0 … 1.
+    tilt_deg
+        Largest tilt (98th percentile).
+    u_low, u_high
+        Range of the control quantity.
+    seconds
+        Time with readings in use.
+    """
+
+    sphere: float
+    heading: float
+    tilt_deg: float
+    u_low: float
+    u_high: float
+    seconds: float
+
+
+@dataclass(frozen=True)
+class FieldResidual:
+    """Field variation that a correction leaves unexplained, mGauss (root mean square).
+
+    Attributes
+    ----------
+    before
+        With the correction that was in force.
+    after
+        With the fit, on the data it saw.
+    held_out
+        With fits that did not see the data they are tested on.
+    held_out_before
+        With the correction in force, on the same held-out stretches.
+    """
+
+    before: float
+    after: float
+    held_out: float
+    held_out_before: float
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What the judge says of one compass.
+
+    Attributes
+    ----------
+    grade
+        Good, marginal or rejected.
+    reasons
+        For a pilot, most important first.
+    heading_error
+        By control quantity.
+    residual, coverage
+        The evidence.
+    """
+
+    grade: Grade
+    reasons: tuple[str, ...]
+    heading_error: tuple[HeadingError, ...]
+    residual: FieldResidual
+    coverage: Coverage
+
+
+@dataclass(frozen=True, eq=False)
+class CompassResult:
+    """One compass from fit to parameters.
+
+    Attributes
+    ----------
+    parameters
+        Exactly what would be written; empty where the fit was rejected.
+    """
+
+    fit: MotorFit
+    verdict: Verdict
+    in_force: Correction
+    parameters: Mapping[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Analysis:
+    """The answer for one recording.
+
+    Attributes
+    ----------
+    source, duration_s, vehicle
+        Where it comes from.
+    compasses
+        One result a compass, in order.
+    notes
+        What a user should know of the recording: what was missing, what was left out.
+    """
+
+    source: str
+    duration_s: float
+    vehicle: Vehicle
+    compasses: tuple[CompassResult, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def grade(self) -> Grade:
+        """The best grade among the compasses; what is written is what is not rejected."""
+        order = (Grade.GOOD, Grade.MARGINAL, Grade.REJECTED)
+        return min((c.verdict.grade for c in self.compasses), key=order.index)
