@@ -35,6 +35,8 @@ class Timing:
     quiet
         Longest time a message may spend on its way. After this long without
         sending, nothing sent earlier can still take effect.
+    storing
+        Time in which an autopilot has stored a write for good.
     silence
         Time without any message after which the link is lost.
     heartbeat_gap
@@ -50,6 +52,7 @@ class Timing:
     window: int = 12
     attempts: int = 25
     quiet: float = 2.0
+    storing: float = 0.3
     silence: float = 10.0
     heartbeat_gap: float = 5.0
     restarts: int = 8
@@ -78,6 +81,7 @@ class Exchange(Generic[Key]):
     def __init__(self, keys: Iterable[Key], timing: Timing) -> None:
         self._open: dict[Key, _Question] = {key: _Question() for key in keys}
         self._timing = timing
+        self._halted = False
         self.total = len(self._open)
         self.most_attempts = 0
         """Times the slowest answered question had to be asked."""
@@ -92,10 +96,24 @@ class Exchange(Generic[Key]):
         """Number of questions answered."""
         return self.total - len(self._open)
 
+    def halt(self) -> None:
+        """Ask nothing more; only what is under way may still be answered."""
+        self._halted = True
+
+    def attempts(self, key: Key) -> int:
+        """How often an open question has been asked."""
+        return self._open[key].attempts
+
+    def idle(self, now: float) -> bool:
+        """Whether no answer is being waited for."""
+        return not any(self._waiting(question, now) for question in self._open.values())
+
     def ask(self, now: float) -> list[tuple[Key, int]]:
         """Questions to be sent now, each with how often it has been asked, this time included."""
         room = self._timing.window - sum(self._waiting(q, now) for q in self._open.values())
         asked: list[tuple[Key, int]] = []
+        if self._halted:
+            return asked
         for key, question in self._open.items():
             if len(asked) >= room:
                 break
@@ -141,7 +159,7 @@ class Exchange(Generic[Key]):
             not self._waiting(q, now) and q.attempts < self._timing.attempts
             for q in self._open.values()
         )
-        if askable and len(waiting) < self._timing.window:
+        if askable and not self._halted and len(waiting) < self._timing.window:
             return now
         return min(waiting, default=now)
 

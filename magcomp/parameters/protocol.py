@@ -2,22 +2,23 @@
 
 Stages and what leaves them
 ---------------------------
-======== ============================================ ========= =================
-stage    sends, a window at a time                    then      mismatch
-======== ============================================ ========= =================
-COMPARE  a read of the identity and all old values    OFF       over, untouched
-OFF      a write of 0 to the switches                 WRITE     roll back
-WRITE    a write of all values of the target          VERIFY    roll back
-VERIFY   a read of all that, switches still 0         ON        SETTLE
-ON       a write of the target's switches             CONFIRM   roll back
-CONFIRM  a read of the switches                       OVER      SETTLE
-SETTLE   nothing, until all sent before is history    IDENTIFY
-IDENTIFY a read of the identity                       OFF       over
+======== ======================================= ======= ========== ==================
+stage    sends, a window at a time               then    on silence another value
+======== ======================================= ======= ========== ==================
+COMPARE  a read of identity and all old values   OFF     over       over
+OFF      a write of 0 to the switches            WRITE   OFF        OFF
+WRITE    a write of each value still to confirm  VERIFY  OFF        OFF
+VERIFY   a read of all values, switches still 0  ON      roll back  SETTLE
+ON       one write of the target's switches      CONFIRM a read     VERIFY
+CONFIRM  a read of the switches                  OVER    roll back  SETTLE
+SETTLE   nothing until all sent before has come  IDENTIFY
+IDENTIFY a read of the identity                  OFF     roll back  over
 OVER     nothing
-======== ============================================ ========= =================
+======== ======================================= ======= ========== ==================
 
-The target is the new set; rolling back is the same road with the old set as
-target, entered at SETTLE.
+Patience is bounded everywhere; where it ends, a vehicle not yet touched is left
+alone and any other is rolled back. The target is the new set; rolling back is
+the same road with the old set as target, entered at SETTLE.
 
 Rules
 -----
@@ -31,18 +32,25 @@ Rules
    index. An echo of another value may be stale, or a sibling's (setting _X
    echoes _Y and _Z): it is counted, not believed, and the write repeated
    together with a read, because ArduPilot answers an unknown name with silence.
-4. Boot time going back, or a gap in the heartbeat, may be a reboot or another
+4. ArduPilot stores a write some time after its echo, in order; a reboot may
+   take the newest back. Silence may be such a reboot. So after silence no
+   value is written before the switches are confirmed 0 anew, and no switch
+   before the values are: only reads and OFF are simply repeated. CONFIRM
+   waits ``storing`` seconds before it asks.
+5. Boot time going back, or a gap in the heartbeat, may be a reboot or another
    vehicle: nothing known before counts. SETTLE, and identity is read again.
-5. Whoever delays messages, delays them at most ``quiet`` seconds. So SETTLE
-   waits that long, and so does OFF after it had to be repeated: a late copy
-   of an old write cannot undo a newer one unseen.
-6. Refusal, silence, a lost link and a request to stop roll back, once.
+6. Whoever delays messages, delays them at most ``quiet`` seconds. So SETTLE
+   waits that long, and so does WRITE after an OFF that had to be repeated: a
+   late copy of an old write cannot undo a newer one unseen.
+7. Refusal, silence, a lost link and a request to stop roll back, once.
    A roll-back that fails leaves the switches 0 where they had been confirmed.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
+from dataclasses import replace
 
 from magcomp.parameters.events import (
     Event,
@@ -61,8 +69,6 @@ from magcomp.parameters.exchange import Exchange, Timing
 from magcomp.parameters.files import format_value
 from magcomp.parameters.messages import (
     REAL32,
-    BootTime,
-    Heartbeat,
     Incoming,
     Outgoing,
     ParamRefused,
@@ -72,6 +78,7 @@ from magcomp.parameters.messages import (
     fits,
 )
 from magcomp.parameters.plan import WritePlan
+from magcomp.parameters.watch import VehicleWatch
 
 _NEXT = {
     Stage.COMPARE: Stage.OFF,
@@ -84,9 +91,9 @@ _NEXT = {
     Stage.IDENTIFY: Stage.OFF,
 }
 _WRITING = frozenset({Stage.OFF, Stage.WRITE, Stage.ON})
+_ROUNDS = frozenset({Stage.OFF, Stage.WRITE})  # written once, then all over again from OFF
 _BELIEVED_READS = 2
-_BELIEVED_ECHOES = 12  # at 30 % loss a good write fails that often once in 10⁶
-_REORDERING = 2.0  # seconds by which boot time may go back without a reboot
+_BELIEVED_ECHOES = 12  # at 30 % loss a good write is lost that often once in 10⁶
 _GATE = 0.2
 
 
@@ -120,16 +127,18 @@ class WriteSequence:
         self._types: dict[str, int] = {}
         self._expected: Mapping[str, float] = {}
         self._exchange: Exchange[str] = Exchange((), self._timing)
-        self._since = now
-        self._heard = now
-        self._heartbeat: float | None = None
-        self._boot_time = 0.0
+        self._watch = VehicleWatch(now, self._timing)
         self._not_before = now
+        self._unconfirmed: dict[str, float] = {}
+        self._rounds: Counter[Stage] = Counter()
+        self._other_values: Counter[str] = Counter()
         self._restarts = 0
+        self._repeats = False
         self._touched = False
         self._switched_off = False
         self.outcome: Outcome | None = None
         self.stage = Stage.COMPARE
+        self._begin_values()
         self._enter(Stage.COMPARE, now)
 
     @property
@@ -141,21 +150,15 @@ class WriteSequence:
         """Take what the vehicle said."""
         if self.finished:
             return
-        self._heard = now
-        match message:
-            case Heartbeat(armed):
-                self._take_heartbeat(now, armed=armed)
-            case BootTime(seconds):
-                if seconds < self._boot_time - _REORDERING:
-                    self._restart(Reason.LINK_LOST, "the vehicle rebooted", now)
-                self._boot_time = seconds
-            case ParamRefused(name, why):
-                if self._exchange.differ(name):
-                    self._fail(Reason.REFUSED, f"{name} was not taken: {why}", now)
-            case ParamValue():
-                self._take_value(message, now)
-            case _:
-                pass
+        interruption = self._watch.hear(message, now)
+        if self._watch.armed:
+            self._end(Reason.ARMED, "the vehicle is armed")
+        elif interruption:
+            self._restart(Reason.LINK_LOST, interruption, now)
+        elif isinstance(message, ParamValue):
+            self._take_value(message, now)
+        elif isinstance(message, ParamRefused) and self._exchange.differ(message.name):
+            self._fail(Reason.REFUSED, f"{message.name} was not taken: {message.reason}", now)
 
     def poll(self, now: float) -> tuple[list[Event], list[Outgoing]]:
         """Tell what has happened, then what is to be sent.
@@ -163,8 +166,10 @@ class WriteSequence:
         Journals must have the events on the disk before the messages are sent.
         """
         self._check_patience(now)
-        while not self.finished and not self._exchange.open and now >= self._not_before:
+        while not self.finished and self._is_complete(now):
             self._leave(now)
+        if self.stage in _ROUNDS and self._exchange.unanswered(now):
+            self._break_off_round(now)
         outgoing = [] if self.finished else self._ask(now)
         events, self._events = self._events, []
         return events, outgoing
@@ -172,12 +177,12 @@ class WriteSequence:
     def wake(self, now: float) -> float:
         """When to poll next, if nothing arrives before."""
         if not self._exchange.open:
-            due = self._not_before
+            due = max(now, self._not_before)
         elif self._gate_closed(now):
-            due = now + _GATE
+            due = max(now + _GATE, self._not_before)
         else:
             due = self._exchange.wake(now)
-        return min(due, self._heard + self._timing.silence)
+        return min(due, self._watch.silent_from)
 
     def stop(
         self, now: float, reason: Reason = Reason.STOPPED, why: str = "it was interrupted"
@@ -190,15 +195,6 @@ class WriteSequence:
         """End at once, because the link cannot be used any more."""
         if not self.finished:
             self._end(Reason.LINK_LOST, why)
-
-    def _take_heartbeat(self, now: float, *, armed: bool) -> None:
-        if armed:
-            self._end(Reason.ARMED, "the vehicle is armed")
-            return
-        before, self._heartbeat = self._heartbeat, now
-        if before is not None and now - before > self._timing.heartbeat_gap:
-            why = f"no heartbeat came for {now - before:.0f} s"
-            self._restart(Reason.LINK_LOST, why, now)
 
     def _take_value(self, message: ParamValue, now: float) -> None:
         name = message.name
@@ -213,13 +209,30 @@ class WriteSequence:
         self._types[name] = message.type
         if self.stage in _WRITING:
             self._events.append(Written(name, wanted))
+        if self.stage is Stage.WRITE:
+            del self._unconfirmed[name]
+            self._rounds[Stage.WRITE] = 0
         done, total = self._exchange.answered, self._exchange.total
         self._events.append(Progress(self.stage, name, done, total))
 
     def _take_other_value(self, name: str, value: float, now: float) -> None:
         count = self._exchange.differ(name)
-        if count < (_BELIEVED_ECHOES if self.stage in _WRITING else _BELIEVED_READS):
+        if count == 0:
             return
+        if self.stage not in _WRITING:
+            if count >= _BELIEVED_READS:
+                self._believe(name, value, now)
+            return
+        repeated = self._exchange.attempts(name) > 1
+        if count == self._exchange.attempts(name):
+            self._other_values[name] += 1
+        if self._other_values[name] >= _BELIEVED_ECHOES:
+            self._believe(name, value, now)
+        elif self.stage is Stage.ON and repeated:
+            # The one write was lost: the values first, then the switch again.
+            self._enter(Stage.VERIFY, now)
+
+    def _believe(self, name: str, value: float, now: float) -> None:
         wanted = self._expected[name]
         why = (
             f"{name} must read back as {format_value(wanted)}; "
@@ -239,13 +252,16 @@ class WriteSequence:
         if self.finished:
             return
         silence, limit = self._timing.silence, self._timing.limit
-        heartbeat = self._since if self._heartbeat is None else self._heartbeat
-        silent = self._exchange.unanswered(now)
-        if now - self._heard >= silence:
+        silent = () if self.stage in _ROUNDS else self._exchange.unanswered(now)
+        if self._watch.is_silent(now):
             self._fail(Reason.LINK_LOST, f"nothing was heard for {silence:.0f} s", now)
-        elif now - self._since >= limit:
+        elif self._watch.is_overdue(now):
             self._fail(Reason.TIMEOUT, f"the write did not end within {limit:.0f} s", now)
-        elif self._gate_closed(now) and now - heartbeat >= silence:
+        elif (
+            self.stage in _WRITING
+            and self._gate_closed(now)
+            and self._watch.is_without_heartbeat(now)
+        ):
             self._fail(Reason.LINK_LOST, f"no heartbeat came for {silence:.0f} s", now)
         elif silent:
             why = f"{silent[0]} was not answered in {self._timing.attempts} attempts"
@@ -253,34 +269,65 @@ class WriteSequence:
 
     def _enter(self, stage: Stage, now: float) -> None:
         off = dict.fromkeys(self._switches, 0.0)
+        on = {name: value for name, value in self._switches.items() if value != 0.0}
+        used = [n for n, v in self._plan.switches.items() if v != 0.0 or self._plan.old[n] != 0.0]
         expected: dict[Stage, Mapping[str, float]] = {
             Stage.COMPARE: {**self._plan.identity, **self._plan.old},
             Stage.IDENTIFY: self._plan.identity,
-            Stage.OFF: off,
-            Stage.WRITE: self._values,
+            Stage.OFF: dict.fromkeys(used, 0.0),
+            Stage.WRITE: dict(self._unconfirmed),
             Stage.VERIFY: {**off, **self._values},
-            Stage.ON: self._switches,
-            Stage.CONFIRM: self._switches,
+            Stage.ON: on,
+            Stage.CONFIRM: {**self._switches, **({} if on else self._values)},
         }
         self.stage = stage
         self._expected = expected.get(stage, {})
-        self._exchange = Exchange(self._expected, self._timing)
+        timing = replace(self._timing, attempts=1) if stage in _ROUNDS else self._timing
+        self._exchange = Exchange(self._expected, timing)
         if stage is Stage.SETTLE:
+            self._begin_values()
             self._not_before = now + self._timing.quiet
+        if stage is Stage.CONFIRM:
+            self._not_before = now + self._timing.storing
         if stage in _WRITING and self._expected:
             self._events.append(Intends(stage, dict(self._expected)))
+
+    def _begin_values(self) -> None:
+        self._unconfirmed = dict(self._values)
+        self._rounds.clear()
+        self._other_values.clear()
+
+    def _is_complete(self, now: float) -> bool:
+        if self._exchange.open:
+            return False
+        return self.stage not in {Stage.SETTLE, Stage.WRITE} or now >= self._not_before
 
     def _leave(self, now: float) -> None:
         if self.stage is Stage.COMPARE and not self._all_fit():
             return
-        if self.stage is Stage.OFF:
-            self._switched_off = True
-        if self.stage is Stage.VERIFY:
-            self._switched_off = False
         if self.stage is Stage.CONFIRM:
             self._complete()
             return
+        self._switched_off = self.stage in _ROUNDS
+        if self.stage is Stage.OFF:
+            self._rounds[Stage.OFF] = 0
         self._enter(_NEXT[self.stage], now)
+
+    def _break_off_round(self, now: float) -> None:
+        self._exchange.halt()
+        if not self._exchange.idle(now):
+            return
+        self._rounds[self.stage] += 1
+        rounds = self._rounds[self.stage]
+        if rounds >= self._timing.attempts:
+            why = f"{self._exchange.open[0]} was not confirmed in {rounds} attempts"
+            self._fail(Reason.TIMEOUT, why, now)
+            return
+        if self.stage is Stage.OFF:
+            self._not_before = now + self._timing.quiet
+        self._switched_off = False
+        self._repeats = True
+        self._enter(Stage.OFF, now)
 
     def _all_fit(self) -> bool:
         for name, value in {**self._values, **self._switches}.items():
@@ -294,21 +341,20 @@ class WriteSequence:
             return []
         outgoing: list[Outgoing] = []
         for name, attempt in self._exchange.ask(now):
-            if self.stage in _WRITING:
+            again = attempt > 1 or (self._repeats and self.stage in _ROUNDS)
+            if self.stage in _ROUNDS or (self.stage is Stage.ON and attempt == 1):
                 self._touched = True
                 kind = self._types.get(name, REAL32)
                 outgoing.append(SetValue(name, self._expected[name], kind))
-                if self.stage is Stage.OFF and attempt > 1:
-                    self._not_before = now + self._timing.quiet
-            if self.stage not in _WRITING or attempt > 1:
+            if self.stage not in _WRITING or again:
                 outgoing.append(ReadName(name))
         return outgoing
 
     def _gate_closed(self, now: float) -> bool:
-        """Whether a write waits for a heartbeat that says disarmed."""
-        if self.stage not in _WRITING:
-            return False
-        return self._heartbeat is None or now - self._heartbeat > self._timing.heartbeat_gap
+        """Whether a write waits for a heartbeat that says disarmed, or CONFIRM for the storage."""
+        if self.stage is Stage.CONFIRM:
+            return now < self._not_before
+        return self.stage in _WRITING and not self._watch.is_known_disarmed(now)
 
     def _restart(self, reason: Reason, why: str, now: float) -> None:
         self._restarts += 1
@@ -327,8 +373,7 @@ class WriteSequence:
         self._events.append(self._rolling_back)
         self._values = {name: self._plan.old[name] for name in self._plan.new}
         self._switches = {name: self._plan.old[name] for name in self._plan.switches}
-        self._since = self._heard = now
-        self._heartbeat = None
+        self._watch.renew(now)
         self._restarts = 0
         self._enter(Stage.SETTLE, now)
 

@@ -27,6 +27,7 @@ DEVICES = (97539, 131874, 263178)
 QUAD = Vehicle("ardupilot", "copter", SYSTEM, COMPONENT, "4.6.3", DEVICES)
 INT8, INT32, REAL32 = 2, 6, 9
 BOOT_TIME = 3.0  # seconds a reboot takes
+STORE_TIME = 0.1  # seconds until a write has reached the storage
 
 
 def float32(value: float) -> float:
@@ -63,13 +64,18 @@ class VirtualClock:
 class FakeAutopilot:
     """Holds parameters and answers like ArduPilot 4.6."""
 
-    def __init__(self, values: Mapping[str, float], read_only: frozenset[str] = frozenset()) -> None:
+    def __init__(
+        self, values: Mapping[str, float], read_only: frozenset[str] = frozenset()
+    ) -> None:
         fixed = dict(zip(("COMPASS_DEV_ID", "COMPASS_DEV_ID2", "COMPASS_DEV_ID3"), DEVICES))
         others = {f"OTHER_{n:03d}": float(n) for n in range(20)}
         scales = {"COMPASS_SCALE": 1.0, "COMPASS_SCALE2": 1.0, "COMPASS_SCALE3": 1.0}
         self.values: dict[str, float] = {
             **{"COMPASS_OFFS_MAX": 1800.0, "COMPASS_PMOT_EN": 0.0, "COMPASS_PMOT1_X": 0.0},
-            **fixed, **scales, **others, **values,
+            **fixed,
+            **scales,
+            **others,
+            **values,
         }
         self.read_only = read_only
         self.denies_in_words = True
@@ -77,7 +83,7 @@ class FakeAutopilot:
         self.quiet_when_unchanged = False
         self.armed = False
         self.booted_at = 0.0
-        self.unsaved: list[tuple[str, float]] = []
+        self.unsaved: list[tuple[float, str, float]] = []
         self.writes: list[tuple[str, float]] = []
         self.states: list[dict[str, float]] = []
 
@@ -88,11 +94,12 @@ class FakeAutopilot:
         hidden = not self.values["COMPASS_PMOT_EN"]
         return [n for n in self.values if not (hidden and n.startswith("COMPASS_PMOT1"))]
 
-    def reboot(self, now: float, lost: int = 0) -> None:
-        """Start again; the newest `lost` writes had not reached the storage."""
-        for _ in range(min(lost, len(self.unsaved))):
-            name, before = self.unsaved.pop()
-            self.values[name] = before
+    def reboot(self, now: float, stored: bool = True) -> None:
+        """Start again; unless `stored`, the newest writes had not reached the storage."""
+        while self.unsaved and not stored:
+            written_at, name, before = self.unsaved.pop()
+            if now - written_at < STORE_TIME:
+                self.values[name] = before
         self.unsaved.clear()
         self.states.append(self.calibration())
         self.booted_at = now + BOOT_TIME
@@ -104,7 +111,7 @@ class FakeAutopilot:
     def system_time(self, now: float) -> Any:
         return mavlink.MAVLink_system_time_message(0, int(1000 * max(0.0, now - self.booted_at)))
 
-    def answer(self, message: Any) -> list[Any]:
+    def answer(self, message: Any, now: float) -> list[Any]:
         match message.get_type():
             case "PARAM_REQUEST_LIST":
                 return [self._value(name, i) for i, name in enumerate(self.listed())]
@@ -116,11 +123,11 @@ class FakeAutopilot:
                 index = message.param_index
                 return [self._value(names[index], index)] if index < len(names) else []
             case "PARAM_SET":
-                return self._set(message.param_id, float32(message.param_value))
+                return self._set(message.param_id, float32(message.param_value), now)
             case _:
                 return []
 
-    def _set(self, name: str, value: float) -> list[Any]:
+    def _set(self, name: str, value: float, now: float) -> list[Any]:
         self.writes.append((name, value))
         if name not in self.values or not math.isfinite(value):
             return self._error(name, 1)
@@ -130,7 +137,7 @@ class FakeAutopilot:
             return [*words, *self._error(name, 5), self._value(name)]
         if self.quiet_when_unchanged and self.values[name] == value:
             return []
-        self.unsaved.append((name, self.values[name]))
+        self.unsaved.append((now, name, self.values[name]))
         self.values[name] = value
         self.states.append(self.calibration())
         siblings = [name]
@@ -235,7 +242,7 @@ class FakeLink:
         if to == "ground":
             return message
         if to == "vehicle" and up:
-            for answer in self.autopilot.answer(message):
+            for answer in self.autopilot.answer(message, now):
                 self._from_vehicle(answer)
         elif to == "heartbeat":
             self._schedule(now + 1.0, "heartbeat", None)
@@ -254,8 +261,8 @@ class FakeLink:
         self._hand_over("ground", message)
 
     def _hand_over(self, to: str, message: Any) -> None:
-        self.before_message(self.messages)
         self.messages += 1
+        self.before_message(self.messages - 1)
         if self.dead:
             return
         for delay in self.network.delays():
