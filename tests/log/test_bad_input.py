@@ -1,4 +1,4 @@
-"""A file that cannot be used is refused in one sentence; a damaged one is read as far as it is whole."""
+"""What cannot be used is refused in one sentence; what is damaged is read as far as it is whole."""
 
 from __future__ import annotations
 

@@ -22,18 +22,8 @@ def read(data: bytes) -> Recording:
 
 
 def every_series(recording: Recording) -> list[Series]:
-    names = [
-        "attitude",
-        "gyro",
-        "accel",
-        "throttle",
-        "current",
-        "voltage",
-        "outputs",
-        "position",
-        "armed",
-    ]
-    found = [getattr(recording, name) for name in names]
+    r = recording
+    found = (r.attitude, r.gyro, r.accel, r.throttle, r.current, r.voltage, r.outputs, r.armed)
     return [series for series in (*found, r.position, *r.field.values()) if series is not None]
 
 
