@@ -4,8 +4,9 @@ Rules
 -----
 1. A frame counts only when its checksum is right. Where it is not, the search goes on
    one byte later, so a false marker never swallows a good frame.
-2. A frame of a message that the dialect does not have cannot be checked. It is
-   taken only where another frame, or nothing, follows it directly.
+2. A frame of a message that the dialect does not have cannot be checked. It is taken
+   only in MAVLink 2, where another frame, or nothing, follows it directly, and
+   where no sound frame begins inside it.
 3. With a signing key, what is not signed with it is refused and counted.
 4. A frame that does not complete within a second was a false marker.
 """
@@ -158,11 +159,31 @@ class Framer:
             message = self._codec.decode(raw)
         except mavlink.MAVError:
             return None
-        if isinstance(message, mavlink.MAVLink_unknown):
-            after = self._pending[start + length : start + length + 1]
-            if after and after[0] not in (_V1, _V2):
-                return None
+        if isinstance(message, mavlink.MAVLink_unknown) and not self._plausible(start, length):
+            return None
         return Frame(bytes(raw), message)
+
+    def _plausible(self, start: int, length: int) -> bool:
+        """Tell whether what cannot be checked stands where a frame should."""
+        pending, end = self._pending, start + length
+        if pending[start] == _V1 or (end < len(pending) and pending[end] not in (_V1, _V2)):
+            return False
+        inner = _next_marker(pending, start + 1)
+        while inner < end:
+            if self._is_sound(inner):
+                return False
+            inner = _next_marker(pending, inner + 1)
+        return True
+
+    def _is_sound(self, start: int) -> bool:
+        length = _frame_length(self._pending, start)
+        if not length or start + length > len(self._pending):
+            return False
+        try:
+            message = self._codec.decode(self._pending[start : start + length])
+        except mavlink.MAVError:
+            return False
+        return not isinstance(message, mavlink.MAVLink_unknown)
 
     def _admit(self, frame: Frame) -> bool:
         if self._check is not None and not self._check.accepts(frame.raw):

@@ -5,6 +5,7 @@ A record is a big-endian 64-bit count of microseconds since 1970 and one MAVLink
 
 from __future__ import annotations
 
+import errno
 import os
 import struct
 from pathlib import Path
@@ -88,4 +89,6 @@ class Recorder:
             with self._file:
                 os.fsync(self._file.fileno())
         except OSError as error:
+            if error.errno in (errno.EINVAL, errno.ENOTSUP):
+                return  # a pipe or a device: there is no disk to wait for
             raise OutputError(f"{self.path} cannot be written: {error.strerror}.") from error

@@ -72,6 +72,8 @@ class SerialTransport:
 
 def _cannot_open(address: SerialLine, error: Exception) -> LinkError:
     code = getattr(error, "errno", None)
+    if code is None and error.__context__ is not None and error.__context__.args:
+        code = error.__context__.args[0]  # pyserial hides the number of a refused setting here
     if code == errno.ENOENT:
         plugged = ", ".join(port.device for port in serial_ports()) or "none"
         reason = f"there is no such serial port (plugged in: {plugged})"

@@ -74,7 +74,7 @@ class UdpTransport:
         """See Transport.write."""
         try:
             if not self._listening:
-                self._socket.send(data)
+                self._send_first(data)
                 return
             recent = self.clock.monotonic() - _PEER_SILENCE_S
             for index, (peer, heard) in enumerate(reversed(list(self._peers.items()))):
@@ -86,6 +86,13 @@ class UdpTransport:
             if error.errno in (errno.ENETUNREACH, errno.EHOSTUNREACH, errno.ENETDOWN):
                 return
             raise TransportClosedError(f"The UDP socket failed: {error.strerror}.") from error
+
+    def _send_first(self, data: bytes) -> None:
+        try:
+            self._socket.send(data)
+        except (ConnectionRefusedError, ConnectionResetError):
+            # The system reports an earlier datagram's fate and has not sent this one.
+            self._socket.send(data)
 
     def close(self) -> None:
         """See Transport.close."""
