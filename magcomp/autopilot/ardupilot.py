@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from magcomp.errors import ParameterFileError
-from magcomp.model import ParameterHistory
+from magcomp.model import CURRENT, THROTTLE, Correction, ParameterHistory
 
 FloatArray = NDArray[np.float64]
 
@@ -31,6 +31,8 @@ OFFSETS_MAX_DEFAULT = 1800.0
 """Arming needs every |OFS| at or under COMPASS_OFFS_MAX."""
 
 COMPASS_COUNT = 3
+
+COMPENSATION_SWITCH = "COMPASS_MOTCT"
 
 _AXES = ("X", "Y", "Z")
 _COMPASS_NAME = re.compile(
@@ -44,6 +46,10 @@ class MotorCompensation(IntEnum):
     OFF = 0
     THROTTLE = 1
     CURRENT = 2
+
+
+COMPENSATION_OF = {CURRENT: MotorCompensation.CURRENT, THROTTLE: MotorCompensation.THROTTLE}
+"""COMPASS_MOTCT that makes the autopilot multiply by a control quantity."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,6 +134,25 @@ def vector_parameters(kind: str, compass: int, vector: ArrayLike) -> dict[str, f
     return {
         name: float(np.float32(value))
         for name, value in zip(vector_names(kind, compass), values, strict=True)
+    }
+
+
+def correction_parameters(correction: Correction, compass: int, scale: float) -> dict[str, float]:
+    """COMPASS_OFS, DIA, ODI and MOT that make the autopilot apply a correction.
+
+    Parameters
+    ----------
+    correction
+        corrected = soft_iron · (raw + offset) + motor · u.
+    compass
+        1, 2 or 3.
+    scale
+        COMPASS_SCALE as in force; it stays, so D = soft_iron / scale.
+    """
+    return {
+        **vector_parameters("OFS", compass, correction.offset),
+        **soft_iron_parameters(correction.soft_iron / scale, compass),
+        **vector_parameters("MOT", compass, correction.motor),
     }
 
 

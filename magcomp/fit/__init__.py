@@ -4,19 +4,23 @@ from magcomp.fit.auto import METHODS, best_form, fit, refit
 from magcomp.fit.ellipsoid import Ellipsoids, fit_ellipsoid, fit_ellipsoids
 from magcomp.fit.flight import Problem
 from magcomp.fit.folds import folds
+from magcomp.fit.levels import centres_of_flight
 from magcomp.fit.line import line_through, orthogonal_line, paper_line, weighted_line
 from magcomp.fit.residual import departures, residuals, spread
+from magcomp.fit.sweep import is_still
 
 __all__ = [
     "METHODS",
     "Ellipsoids",
     "Problem",
     "best_form",
+    "centres_of_flight",
     "departures",
     "fit",
     "fit_ellipsoid",
     "fit_ellipsoids",
     "folds",
+    "is_still",
     "line_through",
     "orthogonal_line",
     "paper_line",

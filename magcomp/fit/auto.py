@@ -13,18 +13,18 @@ from magcomp.fit.flight import (
     GROUPS,
     REGRESSOR_LAG,
     STRENGTH,
-    VERTICAL,
     Problem,
     correction_of,
     estimate,
     lags_of,
+    vertical_of,
 )
 from magcomp.fit.folds import folds
 from magcomp.fit.levels import centres_of_flight, fit_levels, usable_levels, with_line
 from magcomp.fit.residual import residuals, spread
 from magcomp.fit.robust import Estimate
 from magcomp.fit.sweep import fit_sweep, is_still
-from magcomp.model import CORRECTION_SIZE, BoolArray, FloatArray, Lags, MotorFit, pack
+from magcomp.model import CORRECTION_SIZE, OFFSET, BoolArray, FloatArray, Lags, MotorFit, pack
 
 METHODS = ("auto", "sweep", "levels", "flight")
 
@@ -37,6 +37,12 @@ soft iron that shrinks that direction seems to fit better.
 
 CLEAR = 1.5
 """Beyond this factor a look at held-out readings would only repeat what is plain."""
+
+SHARP_OFFSET = 0.05
+"""Opened offsets must be known to this share of the field's strength."""
+
+LEAST_SOFT_IRON, MOST_SOFT_IRON = 0.6, 1.6
+"""Soft iron of a compass that can be used at all has its eigenvalues between these."""
 
 _LEAST_READINGS = 60
 _MOST_FREE = len(GROUPS)
@@ -106,7 +112,10 @@ def refit(problem: Problem, fit: MotorFit, keep: BoolArray) -> MotorFit:
             return fit_levels(part, rows, level)[0]
         return fit
     start = np.concatenate(
-        [pack(fit.correction), [fit.strength, fit.vertical, fit.lags.field, fit.lags.regressor]]
+        [
+            pack(fit.correction),
+            [fit.strength, fit.vertical / fit.strength, fit.lags.field, fit.lags.regressor],
+        ]
     )
     found = estimate(part, _groups(fit), start=start, hold_lags=True, with_covariance=False)
     return _updated(fit, found)
@@ -131,7 +140,7 @@ def fit_flight(problem: Problem) -> MotorFit:
         lags=lags,
         lags_std=Lags(float(std[FIELD_LAG]), float(std[REGRESSOR_LAG])),
         strength=float(found.parameters[STRENGTH]),
-        vertical=float(found.parameters[VERTICAL]),
+        vertical=vertical_of(found.parameters),
         noise=float(np.sqrt(np.mean(found.noise**2))),
         levels=(),
         line=None,
@@ -139,38 +148,70 @@ def fit_flight(problem: Problem) -> MotorFit:
         u_high=float(np.quantile(samples.u, 0.98)),
         count=len(samples),
     )
-    return with_line(bare, centres_of_flight(samples, bare))
+    centres = centres_of_flight(samples, correction, (bare.strength, bare.vertical), bare.noise)
+    return with_line(bare, centres)
 
 
 def _choose_freedom(problem: Problem) -> tuple[Estimate, int]:
-    """The least open fit that explains the field nearly as well as the most open one.
+    """The least open fit that explains the field nearly as well as the most open admissible one.
 
-    The candidates are compared at the lags of the most open fit; the chosen one estimates its own.
+    Admissible is what the data determine: see :func:`is_determined`. Candidates are compared at
+    the lags of the most open fit; the chosen one estimates its own.
     """
-    opened = estimate(problem, _MOST_FREE, with_covariance=False)
+    most, opened = _most_open(problem)
     least = _typical(opened.noise)
-    start = opened.parameters
-    for free in range(1, _MOST_FREE):
+    for free in range(1, most):
         tried = estimate(
-            problem, free, start=start, hold_lags=True, with_covariance=False, rounds=_QUICK
+            problem,
+            free,
+            start=opened.parameters,
+            hold_lags=True,
+            with_covariance=False,
+            rounds=_QUICK,
         )
-        if _typical(tried.noise) <= WORTH * least:
+        ratio = _typical(tried.noise) / least
+        if ratio <= WORTH or (
+            free == most - 1
+            and ratio < CLEAR
+            and not _pays_on_unseen(problem, (tried, free), (opened, most))
+        ):
             return estimate(problem, free, start=tried.parameters), free
-    doubtful = _typical(tried.noise) < CLEAR * least
-    if doubtful and not _pays_on_unseen(problem, tried, opened):
-        return estimate(problem, _MOST_FREE - 1, start=tried.parameters), _MOST_FREE - 1
-    return estimate(problem, _MOST_FREE, start=start), _MOST_FREE
+    return opened, most
+
+
+def _most_open(problem: Problem) -> tuple[int, Estimate]:
+    """The most open fit whose parameters the data determine; with motors alone, always."""
+    for free in range(_MOST_FREE, 1, -1):
+        found = estimate(problem, free)
+        if is_determined(found, problem.earth.strength):
+            return free, found
+    return 1, estimate(problem, 1)
+
+
+def is_determined(found: Estimate, strength: float) -> bool:
+    """Whether opened offsets and soft iron came out sharp and possible.
+
+    A flight that hardly tilts cannot tell an offset along z from a soft iron along z; the
+    solution then runs away along that valley.
+    """
+    offset_std = float(np.sqrt(np.max(np.diag(found.covariance)[OFFSET])))
+    values = np.linalg.eigvalsh(correction_of(found).soft_iron)
+    possible = values[0] > LEAST_SOFT_IRON and values[-1] < MOST_SOFT_IRON
+    return bool(possible and offset_std < SHARP_OFFSET * strength)
 
 
 def _typical(noise: FloatArray) -> float:
     return float(np.exp(np.mean(np.log(noise))))
 
 
-def _pays_on_unseen(problem: Problem, closed: Estimate, opened: Estimate) -> bool:
+def _pays_on_unseen(
+    problem: Problem, closed: tuple[Estimate, int], opened: tuple[Estimate, int]
+) -> bool:
     """Whether the open fit also predicts held-out readings better."""
     fold = folds(problem.readings.time)
     scores = []
-    for found, free in ((closed, _MOST_FREE - 1), (opened, _MOST_FREE)):
+    for found, free in (closed, opened):
+        lags = lags_of(found.parameters)
         left = []
         for index in range(int(fold.max()) + 1):
             part = estimate(
@@ -180,13 +221,13 @@ def _pays_on_unseen(problem: Problem, closed: Estimate, opened: Estimate) -> boo
                 hold_lags=True,
                 with_covariance=False,
             )
-            unseen = problem.where(fold == index).sample(lags_of(found.parameters))
+            unseen = problem.where(fold == index).sample(lags)
             left.append(
                 residuals(
                     unseen,
                     correction_of(part),
                     float(part.parameters[STRENGTH]),
-                    float(part.parameters[VERTICAL]),
+                    vertical_of(part.parameters),
                 )
             )
         scores.append(spread(np.concatenate(left)))
@@ -209,7 +250,7 @@ def _updated(fit: MotorFit, found: Estimate) -> MotorFit:
         fit,
         correction=correction_of(found),
         strength=float(found.parameters[STRENGTH]),
-        vertical=float(found.parameters[VERTICAL]),
+        vertical=vertical_of(found.parameters),
     )
 
 

@@ -40,14 +40,17 @@ from magcomp.model import (
     unpack,
 )
 
-STRENGTH, VERTICAL, FIELD_LAG, REGRESSOR_LAG = range(CORRECTION_SIZE, CORRECTION_SIZE + 4)
+STRENGTH, SIN_DIP, FIELD_LAG, REGRESSOR_LAG = range(CORRECTION_SIZE, CORRECTION_SIZE + 4)
 SIZE = CORRECTION_SIZE + 4
 
 LAG_MEAN_S, LAG_WIDTH_S, LAG_MOST_S = 0.08, 0.1, 0.6
 """AUTOPILOTS.md, Timing: the field lags by 0.05–0.1 s, the current by something of that order."""
 
-MODEL_WIDTH = 0.02
-"""The world model misses local strength and vertical part by about this share of the strength."""
+DIP_WIDTH = 0.02
+"""The world model misses the sine of the local dip by about this much."""
+
+SCALE_WIDTH = 0.15
+"""Sensors without a calibrated scale are off by about this share."""
 
 TRUSTED_OFFSET_MGAUSS = 4.0
 TRUSTED_SOFT_IRON = 0.005
@@ -86,6 +89,10 @@ class Problem:
         """The same with fewer readings."""
         return Problem(self.readings.where(keep), self.control, self.in_force, self.earth)
 
+    def usual_lags(self) -> Lags:
+        """The lags to be expected before any fit."""
+        return Lags(LAG_MEAN_S, LAG_MEAN_S)
+
     def sample(self, lags: Lags) -> Samples:
         """Rows at given lags."""
         in_force = {**self.in_force, self.control.kind: self.control}
@@ -99,7 +106,7 @@ def prior(problem: Problem, free: int) -> Prior:
     mean = np.zeros(SIZE)
     mean[:CORRECTION_SIZE] = pack(present)
     mean[MOTOR] = 0.0
-    mean[[STRENGTH, VERTICAL]] = earth.strength, earth.vertical
+    mean[[STRENGTH, SIN_DIP]] = earth.strength, np.sin(earth.dip)
     mean[[FIELD_LAG, REGRESSOR_LAG]] = LAG_MEAN_S
     width = np.zeros(SIZE)
     width[MOTOR] = np.inf
@@ -107,8 +114,8 @@ def prior(problem: Problem, free: int) -> Prior:
     width[_DIAGONAL] = OPEN_SOFT_IRON if free >= 3 else 0.0
     width[_OFF_DIAGONAL] = OPEN_SOFT_IRON if free >= 4 else 0.0
     # A free shape and a free strength are one number too many: scale is then the model's.
-    width[STRENGTH] = (1e-4 if free >= 3 else MODEL_WIDTH) * earth.strength
-    width[VERTICAL] = MODEL_WIDTH * earth.strength
+    width[STRENGTH] = (1e-4 if free >= 3 else SCALE_WIDTH) * earth.strength
+    width[SIN_DIP] = DIP_WIDTH
     width[[FIELD_LAG, REGRESSOR_LAG]] = LAG_WIDTH_S
     return Prior(mean, width)
 
@@ -203,7 +210,8 @@ def strength_and_dip(samples: Samples, parameters: FloatArray) -> tuple[FloatArr
     residuals = np.stack(
         [
             size - parameters[STRENGTH],
-            np.einsum("ij,ij->i", corrected, samples.down) - parameters[VERTICAL],
+            np.einsum("ij,ij->i", corrected, samples.down)
+            - parameters[STRENGTH] * parameters[SIN_DIP],
         ],
         axis=1,
     )
@@ -221,9 +229,15 @@ def strength_and_dip(samples: Samples, parameters: FloatArray) -> tuple[FloatArr
         rows[:, 11] = direction[:, 1] * centred[:, 2] + direction[:, 2] * centred[:, 1]
         rows[:, REGRESSOR_LAG] = np.einsum("ij,ij->i", direction, shift)
     slopes[:, 0, STRENGTH] = -1.0
-    slopes[:, 1, VERTICAL] = -1.0
+    slopes[:, 1, STRENGTH] = -parameters[SIN_DIP]
+    slopes[:, 1, SIN_DIP] = -parameters[STRENGTH]
     slopes[:, 1, FIELD_LAG] = -np.einsum("ij,ij->i", corrected, samples.down_rate)
     return residuals, slopes
+
+
+def vertical_of(parameters: FloatArray) -> float:
+    """Downward part of the earth's field, mGauss."""
+    return float(parameters[STRENGTH] * parameters[SIN_DIP])
 
 
 def correction_of(found: Estimate) -> Correction:

@@ -16,6 +16,7 @@ import numpy as np
 from magcomp.fit.ellipsoid import Ellipsoids, fit_ellipsoids
 from magcomp.fit.flight import BLOCK_S, Problem
 from magcomp.fit.line import line_through
+from magcomp.fit.residual import departures
 from magcomp.fit.robust import time_blocks
 from magcomp.fit.steady import steady_levels
 from magcomp.model import (
@@ -40,6 +41,7 @@ LEAST_COVERAGE = 0.03
 about one axis."""
 
 _U_FLOOR = 1e-3
+_LEAST_IN_BIN = 20
 
 
 def usable_levels(problem: Problem) -> tuple[Samples, IntArray]:
@@ -161,33 +163,52 @@ def _covariance(
     return np.asarray(covariance * excess)
 
 
-def centres_of_flight(samples: Samples, fit: MotorFit, bins: int = 8) -> tuple[Level, ...]:
+def centres_of_flight(
+    samples: Samples,
+    correction: Correction,
+    earth: tuple[float, float],
+    noise: float,
+    bins: int = 8,
+) -> tuple[Level, ...]:
     """Centres at several control quantities from a flight, by what strength and dip leave over.
 
-    In each bin of the control quantity the corrected field may be off by one body-fixed vector
-    δ. To first order r₁ = along · δ and r₂ = down · δ; the bin's centre is the fitted one less
-    D⁻¹ δ.
+    Parameters
+    ----------
+    samples
+        Readings.
+    correction
+        Any correction close to the truth.
+    earth
+        Strength and vertical part of the earth's field, mGauss.
+    noise
+        Spread of the residuals, mGauss.
+    bins
+        Levels of the control quantity, each with the same number of readings.
+
+    Notes
+    -----
+    In each bin the corrected field may be off by one body-fixed vector δ. To first order
+    r₁ = along · δ and r₂ = down · δ; the bin's centre is the correction's less D⁻¹ δ.
     """
     edges = np.unique(np.quantile(samples.u, np.linspace(0.0, 1.0, bins + 1)))
     bin_of = np.clip(np.searchsorted(edges, samples.u, side="right") - 1, 0, len(edges) - 2)
-    corrected = fit.correction.apply(samples.raw, samples.u)
-    size = np.linalg.norm(corrected, axis=1)
-    directions = np.stack([corrected / size[:, None], samples.down], axis=1)
-    vertical = np.einsum("ij,ij->i", corrected, samples.down)
-    left = np.stack([size - fit.strength, vertical - fit.vertical], axis=1)
-    inverse = np.linalg.inv(fit.correction.soft_iron)
+    corrected = correction.apply(samples.raw, samples.u)
+    along = corrected / np.linalg.norm(corrected, axis=1, keepdims=True)
+    directions = np.stack([along, samples.down], axis=1)
+    left = departures(corrected, samples.down, *earth)
+    inverse = np.linalg.inv(correction.soft_iron)
     levels = []
     for index in range(len(edges) - 1):
         rows = bin_of == index
-        if np.count_nonzero(rows) < 20:
+        if np.count_nonzero(rows) < _LEAST_IN_BIN:
             continue
-        delta, covariance = _leftover(directions[rows], left[rows], fit.noise)
+        delta, covariance = _leftover(directions[rows], left[rows], noise)
         u = samples.u[rows]
         levels.append(
             Level(
                 u=float(u.mean()),
                 u_std=float(np.hypot(u.std() / np.sqrt(len(u)), _U_FLOOR)),
-                centre=fit.correction.centre(float(u.mean())) + inverse @ delta,
+                centre=correction.centre(float(u.mean())) + inverse @ delta,
                 covariance=inverse @ covariance @ inverse.T,
                 count=int(np.count_nonzero(rows)),
             )

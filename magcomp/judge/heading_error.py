@@ -1,0 +1,120 @@
+"""From field to degrees: what a correction leaves of heading error, and how sure that is."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from magcomp.geometry import body_from_earth, heading_shift, level_matrix, wrap_angle
+from magcomp.model import (
+    CORRECTION_SIZE,
+    CURRENT,
+    OFFSET,
+    SOFT_IRON,
+    Correction,
+    FloatArray,
+    HeadingError,
+    MotorFit,
+    symmetric,
+)
+
+TILT_RAD = np.radians(20.0)
+"""Heading errors are given level and at this tilt, whichever is larger."""
+
+_YAWS = np.radians(np.arange(0.0, 360.0, 10.0))
+_DRAWS = 400
+_CURRENTS = (0.0, 10.0, 20.0, 30.0, 40.0, 50.0)
+_THROTTLES = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
+
+
+def attitudes() -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Roll, pitch and yaw of a full turn level and tilted four ways, radians, shape (k,) each."""
+    tilts = [(0.0, 0.0), (TILT_RAD, 0.0), (-TILT_RAD, 0.0), (0.0, TILT_RAD), (0.0, -TILT_RAD)]
+    roll, pitch = (np.repeat([tilt[axis] for tilt in tilts], len(_YAWS)) for axis in (0, 1))
+    return roll, pitch, np.tile(_YAWS, len(tilts))
+
+
+def control_grid(fit: MotorFit) -> FloatArray:
+    """Control quantities a table of heading errors is given at."""
+    grid = _CURRENTS if fit.regressor == CURRENT else _THROTTLES
+    step = grid[1]
+    if fit.regressor == CURRENT and fit.u_high > grid[-1] + step / 2:
+        return np.arange(0.0, fit.u_high + step / 2, step)
+    return np.array(grid)
+
+
+def heading_errors(
+    fit: MotorFit, present: Correction, present_u: FloatArray, rng: np.random.Generator
+) -> tuple[HeadingError, ...]:
+    """Largest heading error over all yaws, level and tilted, by control quantity.
+
+    Parameters
+    ----------
+    fit
+        Its correction is taken as the truth for ``before``; its covariance makes ``after``.
+    present
+        The correction in force.
+    present_u
+        What ``present.motor`` is multiplied by at each control quantity of
+        :func:`control_grid`, shape (k,).
+    rng
+        For the draws from the covariance.
+
+    Notes
+    -----
+    ``before`` is exact; ``after`` and ``p95`` use the first-order shift of PAPER.md 7 on draws
+    of all 12 parameters.
+    """
+    roll, pitch, yaw = attitudes()
+    horizontal = np.sqrt(max(fit.strength**2 - fit.vertical**2, 1.0))
+    earth = np.array([horizontal, 0.0, fit.vertical])
+    field = body_from_earth(roll, pitch, yaw) @ earth
+    draws = rng.multivariate_normal(
+        np.zeros(CORRECTION_SIZE), fit.covariance, size=_DRAWS, method="eigh"
+    )
+    inverse = np.linalg.inv(fit.correction.soft_iron)
+    rows = []
+    for u, u_present in zip(control_grid(fit), present_u, strict=True):
+        raw = (field - u * fit.correction.motor) @ inverse.T - fit.correction.offset
+        before = present.apply(raw, np.full(len(raw), u_present))
+        slopes = _shift_slopes(field, raw + fit.correction.offset, roll, pitch, u, fit)
+        largest = np.abs(draws @ slopes.T).max(axis=1)
+        rows.append(
+            HeadingError(
+                u=float(u),
+                before=largest_shift(before, field, roll, pitch),
+                after=float(np.degrees(np.median(largest))),
+                p95=float(np.degrees(np.quantile(largest, 0.95))),
+            )
+        )
+    return tuple(rows)
+
+
+def largest_shift(
+    found: FloatArray, true: FloatArray, roll: FloatArray, pitch: FloatArray
+) -> float:
+    """Largest difference of heading between two fields, degrees."""
+    level = level_matrix(roll, pitch)
+    found, true = (np.einsum("kij,kj->ki", level, f) for f in (found, true))
+    shift = np.arctan2(-found[:, 1], found[:, 0]) - np.arctan2(-true[:, 1], true[:, 0])
+    return float(np.degrees(np.abs(wrap_angle(shift)).max()))
+
+
+def _shift_slopes(
+    field: FloatArray,
+    centred: FloatArray,
+    roll: FloatArray,
+    pitch: FloatArray,
+    u: float,
+    fit: MotorFit,
+) -> FloatArray:
+    """Change of heading per unit of each of the 12 parameters, radians, shape (k, 12)."""
+    slopes = np.empty((len(field), CORRECTION_SIZE))
+    for index in range(3):
+        unit = np.eye(3)[index]
+        slopes[:, index] = heading_shift(np.tile(u * unit, (len(field), 1)), field, roll, pitch)
+        column = np.tile(fit.correction.soft_iron[:, index], (len(field), 1))
+        slopes[:, OFFSET.start + index] = heading_shift(column, field, roll, pitch)
+    for index in range(6):
+        moved = centred @ symmetric(np.eye(6)[index]).T
+        slopes[:, SOFT_IRON.start + index] = heading_shift(moved, field, roll, pitch)
+    return slopes

@@ -1,0 +1,235 @@
+"""The verdict: good, marginal or rejected, and why, in words for a pilot."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from magcomp.align import interpolate
+from magcomp.fit import Problem
+from magcomp.judge.evidence import cover, field_residual, used_lags
+from magcomp.judge.heading_error import control_grid, heading_errors
+from magcomp.judge.thresholds import Thresholds
+from magcomp.model import (
+    CURRENT,
+    MOTOR,
+    Coverage,
+    FieldResidual,
+    FloatArray,
+    Grade,
+    HeadingError,
+    MotorFit,
+    Samples,
+    Verdict,
+)
+
+DEFAULT_SEED = 20_240_601
+
+
+@dataclass(frozen=True)
+class _Finding:
+    """One thing the judge noticed: how bad, and what to tell the pilot."""
+
+    grade: Grade
+    reason: str
+
+
+def judge(
+    problem: Problem,
+    fit: MotorFit,
+    thresholds: Thresholds | None = None,
+    rng: np.random.Generator | None = None,
+) -> tuple[MotorFit, Verdict]:
+    """Judge a fit on data it did not see.
+
+    Parameters
+    ----------
+    problem, fit
+        What was fitted and what came out.
+    thresholds
+        The limits; the defaults are the product's.
+    rng
+        For the draws that turn covariance into degrees; fixed by default, so that the same log
+        always gets the same answer.
+
+    Returns
+    -------
+    MotorFit
+        The fit with its covariance widened where the folds scatter more than it says.
+    Verdict
+        Grade, reasons and evidence.
+    """
+    limits = Thresholds() if thresholds is None else thresholds
+    rng = np.random.default_rng(DEFAULT_SEED) if rng is None else rng
+    samples = problem.sample(used_lags(fit))
+    residual, motors = field_residual(problem, fit)
+    fit = _widened(fit, motors)
+    errors = heading_errors(
+        fit, problem.readings.in_force[-1].correction, _present_control(problem, samples, fit), rng
+    )
+    covered = cover(samples, fit.correction.apply(samples.raw, samples.u))
+    findings = list(_findings(fit, errors, residual, covered, limits))
+    grade = max((f.grade for f in findings), key=_severity, default=Grade.GOOD)
+    summary = _summary(fit, errors, residual)
+    reasons = tuple(
+        f.reason for f in sorted(findings, key=lambda f: _severity(f.grade), reverse=True)
+    )
+    return fit, Verdict(grade, (*reasons, summary), errors, residual, covered)
+
+
+def _severity(grade: Grade) -> int:
+    return (Grade.GOOD, Grade.MARGINAL, Grade.REJECTED).index(grade)
+
+
+def _widened(fit: MotorFit, motors: FloatArray) -> MotorFit:
+    """The covariance scaled up where leaving out a fold moves the answer more than it allows.
+
+    Notes
+    -----
+    Delete-a-group jackknife: with k folds the variance of the motor vector is
+    (k − 1) / k · Σ (pᵢ − p̄)². The factor is the mean ratio over the three axes.
+    """
+    count = len(motors)
+    jackknife = (count - 1) / count * np.sum((motors - motors.mean(axis=0)) ** 2, axis=0)
+    stated = np.maximum(np.diag(fit.covariance)[MOTOR], 1e-18)
+    factor = max(1.0, float(np.mean(jackknife / stated)))
+    return replace(fit, covariance=fit.covariance * factor)
+
+
+def _present_control(problem: Problem, samples: Samples, fit: MotorFit) -> FloatArray:
+    """What the motor correction in force multiplies at each control quantity of the table."""
+    grid = control_grid(fit)
+    kind = problem.readings.in_force[-1].regressor
+    if kind in (None, fit.regressor) or kind not in problem.in_force:
+        return grid
+    other = interpolate(problem.in_force[kind].series, samples.time - samples.lags.regressor)
+    slope, intercept = np.polyfit(samples.u, other, 1)
+    return np.asarray(np.maximum(intercept + slope * grid, 0.0))
+
+
+def _findings(
+    fit: MotorFit,
+    errors: tuple[HeadingError, ...],
+    residual: FieldResidual,
+    covered: Coverage,
+    limits: Thresholds,
+) -> Iterator[_Finding]:
+    yield from _on_control(fit, covered, limits)
+    yield from _on_unseen(fit, errors, residual, limits)
+    yield from _on_bound(fit, errors, limits)
+    yield from _on_shape(fit, residual, covered, limits)
+
+
+def _on_control(fit: MotorFit, covered: Coverage, limits: Thresholds) -> Iterator[_Finding]:
+    span = covered.u_high - covered.u_low
+    if fit.regressor == CURRENT and span < limits.least_current_a:
+        yield _Finding(
+            Grade.REJECTED,
+            f"the current only ranged from {covered.u_low:.0f} to {covered.u_high:.0f} A: "
+            "fly climbs and descents so that the motors work harder and less hard",
+        )
+    elif fit.regressor != CURRENT and span < limits.least_throttle:
+        yield _Finding(
+            Grade.REJECTED,
+            f"the throttle never rose above {covered.u_high * 100:.0f} %: fly a climb"
+            if covered.u_high < 0.3
+            else f"the throttle only ranged from {covered.u_low * 100:.0f} to "
+            f"{covered.u_high * 100:.0f} %: fly climbs and descents",
+        )
+
+
+def _on_unseen(
+    fit: MotorFit,
+    errors: tuple[HeadingError, ...],
+    residual: FieldResidual,
+    limits: Thresholds,
+) -> Iterator[_Finding]:
+    at_top = error_at(errors, fit.u_high)
+    claims = at_top.before > at_top.p95
+    fall = 1.0 - residual.held_out / residual.held_out_before if residual.held_out_before else 0.0
+    if claims and fall < 0.0:
+        yield _Finding(
+            Grade.REJECTED,
+            "on stretches it did not see, the new correction explains the field worse than the "
+            f"one in force ({residual.held_out:.1f} instead of {residual.held_out_before:.1f} "
+            "mGauss): something else than the motors disturbs this compass",
+        )
+    elif claims and fall < limits.improvement:
+        yield _Finding(
+            Grade.MARGINAL,
+            f"on stretches it did not see, the unexplained field falls only from "
+            f"{residual.held_out_before:.1f} to {residual.held_out:.1f} mGauss",
+        )
+
+
+def _on_bound(
+    fit: MotorFit, errors: tuple[HeadingError, ...], limits: Thresholds
+) -> Iterator[_Finding]:
+    at_top = error_at(errors, fit.u_high)
+    if at_top.p95 > limits.marginal_deg:
+        grade = Grade.REJECTED
+    elif at_top.p95 > limits.good_deg:
+        grade = Grade.MARGINAL
+    else:
+        return
+    yield _Finding(
+        grade,
+        f"the heading could still be wrong by {at_top.p95:.1f}° at {_quantity(fit, at_top.u)}: "
+        "record longer, turn all the way round and use the whole range of throttle",
+    )
+
+
+def _on_shape(
+    fit: MotorFit, residual: FieldResidual, covered: Coverage, limits: Thresholds
+) -> Iterator[_Finding]:
+    if fit.method == "flight" and covered.heading < limits.heading:
+        yield _Finding(
+            Grade.MARGINAL,
+            f"the vehicle faced only {covered.heading * 100:.0f} % of a full turn: "
+            "turn slowly all the way round",
+        )
+    if residual.held_out > limits.noise_share * fit.strength:
+        yield _Finding(
+            Grade.MARGINAL,
+            f"{residual.held_out:.0f} mGauss of {fit.strength:.0f} stay unexplained: look for "
+            "iron, loose wiring or other currents near this compass",
+        )
+    line = fit.line
+    if line is not None and len(fit.levels) > 2:
+        length = float(np.ptp(line.positions))
+        noise = float(np.sqrt(np.mean([np.trace(lv.covariance) for lv in fit.levels])))
+        if line.rms > limits.bends * length and line.rms > 2.0 * noise:
+            yield _Finding(
+                Grade.MARGINAL,
+                f"the shift does not follow a straight line ({line.rms:.1f} mGauss off a line of "
+                f"{length:.0f}): the motors' wires may carry their currents unequally",
+            )
+
+
+def error_at(errors: tuple[HeadingError, ...], u: float) -> HeadingError:
+    """The row of the table for a control quantity: the first at or above it, else the last."""
+    return next((row for row in errors if row.u >= u - 1e-9), errors[-1])
+
+
+def _quantity(fit: MotorFit, u: float) -> str:
+    return f"{u:.0f} A" if fit.regressor == CURRENT else f"{u * 100:.0f} % throttle"
+
+
+def _summary(fit: MotorFit, errors: tuple[HeadingError, ...], residual: FieldResidual) -> str:
+    at_top = error_at(errors, fit.u_high)
+    where = _quantity(fit, at_top.u)
+    unseen = (
+        f"on stretches it did not see, the unexplained field goes from "
+        f"{residual.held_out_before:.1f} to {residual.held_out:.1f} mGauss"
+    )
+    if at_top.before <= at_top.p95:
+        return (
+            f"the correction in force is already as good as this log can tell: at {where} it is "
+            f"within {at_top.before:.1f}°, the fit within {at_top.p95:.1f}° (95 %); {unseen}"
+        )
+    return (
+        f"at {where} the heading error falls from {at_top.before:.1f}° to at most "
+        f"{at_top.p95:.1f}° (95 %); {unseen}"
+    )

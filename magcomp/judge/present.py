@@ -1,0 +1,128 @@
+"""Judging the calibration in force without fitting another one."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from magcomp.fit import Problem, centres_of_flight, departures, is_still, spread
+from magcomp.geometry import body_from_earth
+from magcomp.judge.evidence import cover
+from magcomp.judge.heading_error import attitudes, largest_shift
+from magcomp.judge.thresholds import Thresholds
+from magcomp.model import (
+    CURRENT,
+    Correction,
+    FieldResidual,
+    FloatArray,
+    Grade,
+    HeadingError,
+    Level,
+    Samples,
+    Verdict,
+)
+
+_MAD_TO_STD = 1.4826
+_BINS = 6
+_TWO_SIDED_95 = 1.96
+
+
+def judge_present(problem: Problem, thresholds: Thresholds | None = None) -> Verdict:
+    """Judge the calibration in force.
+
+    Parameters
+    ----------
+    problem
+        A compass and the control quantity that its correction in force multiplies, or any
+        where none is in force.
+    thresholds
+        The limits.
+
+    Notes
+    -----
+    At each level of the control quantity, what the reported field is off by on average, as one
+    body-fixed vector, is turned into degrees. A heading error that is the same at every level
+    and changes neither strength nor dip cannot be seen this way.
+    """
+    limits = Thresholds() if thresholds is None else thresholds
+    samples = problem.sample(problem.usual_lags())
+    present = problem.readings.in_force[-1].correction
+    middle = np.median(departures(samples.present, samples.down, 0.0, 0.0), axis=0)
+    earth = (float(middle[0]), float(middle[1]))
+    left = departures(samples.present, samples.down, *earth)
+    noise = max(_MAD_TO_STD * float(np.median(np.abs(left))), 0.2)
+    levels = (
+        _still_levels(samples, present, noise)
+        if is_still(samples)
+        else centres_of_flight(samples, present, earth, noise, _BINS)
+    )
+    errors = tuple(_error(level, present, earth) for level in levels)
+    unexplained = spread(left)
+    grade, reason = _grade(errors, problem.control.kind, limits)
+    return Verdict(
+        grade=grade,
+        reasons=(reason, f"{unexplained:.1f} mGauss of {earth[0]:.0f} are unexplained"),
+        heading_error=errors,
+        residual=FieldResidual(unexplained, unexplained, unexplained, unexplained),
+        coverage=cover(samples, samples.present),
+    )
+
+
+def _still_levels(samples: Samples, present: Correction, noise: float) -> tuple[Level, ...]:
+    """Mean departure of the field from its value at the lowest control quantity, as centres."""
+    edges = np.linspace(samples.u.min(), samples.u.max(), _BINS + 1)
+    bin_of = np.clip(np.searchsorted(edges, samples.u, side="right") - 1, 0, _BINS - 1)
+    inverse = np.linalg.inv(present.soft_iron)
+    rest = np.median(samples.present[bin_of == bin_of.min()], axis=0)
+    levels = []
+    for index in np.unique(bin_of):
+        rows = bin_of == index
+        u = float(np.mean(samples.u[rows]))
+        delta = np.median(samples.present[rows], axis=0) - rest
+        count = int(np.count_nonzero(rows))
+        levels.append(
+            Level(
+                u=u,
+                u_std=0.0,
+                centre=present.centre(u) + inverse @ delta,
+                covariance=noise**2 / count * inverse @ inverse.T,
+                count=count,
+            )
+        )
+    return tuple(levels)
+
+
+def _error(level: Level, present: Correction, earth: tuple[float, float]) -> HeadingError:
+    """Heading error that a level's departure from the present correction makes."""
+    delta = present.soft_iron @ (level.centre - present.centre(level.u))
+    covariance = present.soft_iron @ level.covariance @ present.soft_iron.T
+    doubt = _TWO_SIDED_95 * float(np.sqrt(np.linalg.eigvalsh(covariance)[-1]))
+    size = float(np.linalg.norm(delta))
+    direction: FloatArray = delta / size if size > 0 else np.array([1.0, 0.0, 0.0])
+    found = _shift(delta, earth)
+    return HeadingError(
+        u=level.u, before=found, after=found, p95=_shift(direction * (size + doubt), earth)
+    )
+
+
+def _shift(delta: FloatArray, earth: tuple[float, float]) -> float:
+    strength, vertical = earth
+    roll, pitch, yaw = attitudes()
+    horizontal = np.sqrt(max(strength**2 - vertical**2, 1.0))
+    field = body_from_earth(roll, pitch, yaw) @ np.array([horizontal, 0.0, vertical])
+    return largest_shift(field + delta, field, roll, pitch)
+
+
+def _grade(errors: tuple[HeadingError, ...], kind: str, limits: Thresholds) -> tuple[Grade, str]:
+    if not errors:
+        return Grade.REJECTED, "the recording is too short to judge the calibration in force"
+    worst = max(errors, key=lambda row: row.before)
+    where = f"{worst.u:.0f} A" if kind == CURRENT else f"{worst.u * 100:.0f} % throttle"
+    found = (
+        f"with the calibration in force the heading is wrong by up to {worst.before:.1f}° at "
+        f"{where} (at most {worst.p95:.1f}° with 95 %)"
+    )
+    if worst.before > limits.marginal_deg:
+        return Grade.REJECTED, found
+    if worst.before > limits.good_deg or worst.p95 > limits.marginal_deg:
+        return Grade.MARGINAL, found
+    return Grade.GOOD, found

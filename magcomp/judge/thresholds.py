@@ -1,0 +1,36 @@
+"""What separates good from marginal and rejected. Change them here, in the open."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Thresholds:
+    """Limits of the judge.
+
+    Attributes
+    ----------
+    good_deg, marginal_deg
+        95 % bound of the heading error at the largest control quantity the data cover.
+    improvement
+        Share by which the held-out field variation must fall where the fit claims a change
+        larger than its own uncertainty.
+    least_current_a, least_throttle
+        Range the control quantity must cover.
+    heading, bends
+        Share of a full turn that must be seen in flight, and the distance of the centres from
+        their line, as a share of its length, beyond which the line is not one.
+    noise_share
+        Unexplained field after the fit, as a share of the field's strength, beyond which
+        something else than the motors disturbs the compass.
+    """
+
+    good_deg: float = 3.0
+    marginal_deg: float = 6.0
+    improvement: float = 0.05
+    least_current_a: float = 5.0
+    least_throttle: float = 0.12
+    heading: float = 0.6
+    bends: float = 0.15
+    noise_share: float = 0.04

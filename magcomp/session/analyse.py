@@ -1,0 +1,279 @@
+"""Recording → Analysis: every compass fitted and judged with one control quantity for all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from magcomp.align import controls, readings, reported
+from magcomp.earth import EarthField, expected_field
+from magcomp.errors import FitRejectedError, MissingDataError, UsageError
+from magcomp.fit import METHODS, Problem, best_form, fit
+from magcomp.geometry import gravity_direction
+from magcomp.judge import judge, judge_present
+from magcomp.model import (
+    CURRENT,
+    THROTTLE,
+    Analysis,
+    CompassResult,
+    Control,
+    MotorFit,
+    Recording,
+    Verdict,
+)
+from magcomp.session.emit import emit
+
+REGRESSORS = ("auto", CURRENT, THROTTLE, "motors")
+
+BETTER = 0.97
+"""Throttle is written instead of current only where it leaves less than this share unexplained:
+current needs no battery at the same voltage."""
+
+Progress = Callable[[str, float], None]
+"""What is being done, and the share done, 0 … 1."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """What the user asked for.
+
+    Attributes
+    ----------
+    compass
+        One compass; all by default.
+    method, regressor
+        ``auto`` chooses.
+    start, end
+        Seconds since the recording began.
+    """
+
+    compass: int | None = None
+    method: str = "auto"
+    regressor: str = "auto"
+    start: float = -np.inf
+    end: float = np.inf
+
+    def __post_init__(self) -> None:
+        if self.method not in METHODS:
+            raise UsageError(
+                f"The method must be one of {', '.join(METHODS)}; instead received {self.method}"
+            )
+        if self.regressor not in REGRESSORS:
+            raise UsageError(
+                f"The regressor must be one of {', '.join(REGRESSORS)}; "
+                f"instead received {self.regressor}"
+            )
+        if self.regressor == "motors":
+            raise UsageError(
+                "The regressor must be auto, current or throttle; instead received motors: "
+                "compensation per motor is not fitted yet"
+            )
+        if not self.start < self.end:
+            raise UsageError(
+                f"The start must be before the end; instead received {self.start} and {self.end}"
+            )
+
+
+def analyse(
+    recording: Recording,
+    options: Options | None = None,
+    progress: Progress = lambda _what, _share: None,
+) -> Analysis:
+    """Fit and judge the compasses of a recording.
+
+    Parameters
+    ----------
+    recording
+        From any source.
+    options
+        What to fit and how.
+    progress
+        Called as the work goes on.
+
+    Raises
+    ------
+    MissingDataError
+        Where the recording lacks a compass, the attitude, or any control quantity.
+    FitRejectedError
+        Where the method asked for cannot work.
+    ParameterFileError
+        Where a compass parameter in the recording is not finite.
+    """
+    wanted = Options() if options is None else options
+    found = _controls_of(recording, wanted)
+    earth, notes = _earth(recording)
+    compasses = _compasses(recording, wanted)
+    kinds = list(dict.fromkeys(control.kind for control in found))
+    steps = len(kinds) * len(compasses)
+    judged: dict[str, list[_Judged]] = {}
+    for kind in kinds:
+        forms = [control for control in found if control.kind == kind]
+        for compass in compasses:
+            progress(f"compass {compass} by {kind}", sum(map(len, judged.values())) / steps)
+            result = _one(recording, compass, wanted, forms, reported(found), earth)
+            forms = [result.problem.control]
+            judged.setdefault(kind, []).append(result)
+    progress("done", 1.0)
+    chosen = _choose(judged)
+    parameters = emit(
+        recording, [(j.fit, j.verdict, j.problem.readings.in_force[-1]) for j in judged[chosen]]
+    )
+    return Analysis(
+        source=recording.source,
+        duration_s=recording.duration_s,
+        vehicle=recording.vehicle,
+        compasses=tuple(
+            CompassResult(
+                fit=j.fit,
+                verdict=j.verdict,
+                in_force=j.problem.readings.in_force[-1].correction,
+                parameters=parameters[j.fit.compass],
+            )
+            for j in judged[chosen]
+        ),
+        notes=(*notes, *_notes(recording, judged, chosen)),
+    )
+
+
+def check(recording: Recording, options: Options | None = None) -> Mapping[int, Verdict]:
+    """Judge the calibration in force of each compass; nothing is fitted.
+
+    Raises
+    ------
+    MissingDataError
+        As :func:`analyse`.
+    """
+    wanted = Options() if options is None else options
+    found = _controls_of(recording, wanted)
+    earth, _ = _earth(recording)
+    by_kind = reported(found)
+    verdicts = {}
+    for compass in _compasses(recording, wanted):
+        new = readings(recording, compass, start=wanted.start, end=wanted.end)
+        kind = new.in_force[-1].regressor or found[0].kind
+        if kind not in by_kind:
+            raise MissingDataError(
+                f"Compass {compass} is corrected by {kind}, so {recording.source} must hold the "
+                f"{kind}; instead it holds {', '.join(by_kind)}"
+            )
+        verdicts[compass] = judge_present(Problem(new, by_kind[kind], by_kind, earth))
+    return verdicts
+
+
+@dataclass(frozen=True, eq=False)
+class _Judged:
+    problem: Problem
+    fit: MotorFit
+    verdict: Verdict
+
+
+def _one(
+    recording: Recording,
+    compass: int,
+    wanted: Options,
+    forms: Iterable[Control],
+    in_force: Mapping[str, Control],
+    earth: EarthField,
+) -> _Judged:
+    new = readings(recording, compass, start=wanted.start, end=wanted.end)
+    problem = best_form([Problem(new, form, in_force, earth) for form in forms])
+    found, verdict = judge(problem, fit(problem, wanted.method))
+    return _Judged(problem, found, verdict)
+
+
+def _controls_of(recording: Recording, wanted: Options) -> tuple[Control, ...]:
+    found = controls(recording)
+    if not found:
+        raise MissingDataError(
+            f"{recording.source} must hold a battery current or a throttle that changes; instead "
+            "it holds neither: was the vehicle ever armed?"
+        )
+    if wanted.regressor == "auto":
+        return found
+    kept = tuple(control for control in found if control.kind == wanted.regressor)
+    if not kept:
+        raise MissingDataError(
+            f"{recording.source} must hold a {wanted.regressor} that changes; instead it holds "
+            f"only {', '.join(sorted({c.kind for c in found}))}"
+        )
+    # The others stay at hand for undoing a correction that was in force.
+    return kept + tuple(c for c in found if c.kind not in {k.kind for k in kept})[:0]
+
+
+def _compasses(recording: Recording, wanted: Options) -> list[int]:
+    if not recording.field:
+        raise MissingDataError(
+            f"{recording.source} must hold readings of a compass (RAW_IMU, SCALED_IMU2 or "
+            "SCALED_IMU3); instead it holds none"
+        )
+    return sorted(recording.field) if wanted.compass is None else [wanted.compass]
+
+
+def _earth(recording: Recording) -> tuple[EarthField, list[str]]:
+    """The expected field at the recording's own position and date, else one like the readings."""
+    if recording.position is not None and len(recording.position):
+        latitude, longitude, altitude = np.median(recording.position.value, axis=0)
+        return expected_field(latitude, longitude, altitude, recording.start_unix_s), []
+    first = recording.field[min(recording.field)] if recording.field else None
+    if first is None or recording.attitude is None:
+        raise MissingDataError(
+            f"{recording.source} must hold a compass and the attitude; instead one is missing"
+        )
+    columns = [
+        np.interp(first.time, recording.attitude.time, recording.attitude.value[:, axis])
+        for axis in (0, 1)
+    ]
+    strength = float(np.median(np.linalg.norm(first.value, axis=1)))
+    vertical = float(np.median(np.einsum("ij,ij->i", first.value, gravity_direction(*columns))))
+    return EarthField(strength, float(np.arcsin(np.clip(vertical / strength, -1, 1))), 0.0), [
+        "the log holds no position: the earth's field is taken from the readings themselves"
+    ]
+
+
+def _choose(judged: Mapping[str, list[_Judged]]) -> str:
+    """The control quantity that predicts held-out data better; current where it is close."""
+
+    def unexplained(kind: str) -> float:
+        logs = [np.log(max(j.verdict.residual.held_out, 1e-6)) for j in judged[kind]]
+        return float(np.exp(np.mean(logs)))
+
+    if len(judged) == 1:
+        return next(iter(judged))
+    return THROTTLE if unexplained(THROTTLE) < BETTER * unexplained(CURRENT) else CURRENT
+
+
+def _notes(recording: Recording, judged: Mapping[str, list[_Judged]], chosen: str) -> Iterable[str]:
+    if len(judged) > 1:
+        scores = ", ".join(
+            f"{kind} leaves "
+            + "/".join(f"{j.verdict.residual.held_out:.1f}" for j in results)
+            + " mGauss"
+            for kind, results in judged.items()
+        )
+        yield f"{chosen} is used because it is the better choice on held-out data: {scores}"
+    elif chosen == THROTTLE and recording.current is None:
+        yield "the log holds no battery current, so throttle is used"
+    if recording.vehicle.kind not in ("copter", "unknown"):
+        yield (
+            f"the vehicle is a {recording.vehicle.kind}: magcomp is made for multirotors, whose "
+            "thrust demand is the throttle the autopilot multiplies"
+        )
+    if not recording.parameters.names:
+        yield (
+            "the log holds no parameters: the calibration in force is unknown, so only the motor "
+            "vector is given, and it is right only if no motor compensation was in force"
+        )
+    others = recording.report.others
+    if others:
+        named = ", ".join(f"{system}:{component}" for system, component in others)
+        yield f"messages of other systems were left out ({named})"
+    if recording.report.bad_checksum:
+        yield f"{recording.report.bad_checksum} damaged messages were left out"
+
+
+def rejected(result: Analysis) -> FitRejectedError:
+    """The error that says why nothing of an analysis should be written."""
+    first = result.compasses[0].verdict.reasons[0]
+    return FitRejectedError(f"No compass has a fit to be trusted: {first}.")
