@@ -13,9 +13,12 @@ Rules
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
+
+_MISTAKEN = 1e-6
 
 Key = TypeVar("Key", str, int)
 
@@ -83,8 +86,7 @@ class Exchange(Generic[Key]):
         self._timing = timing
         self._halted = False
         self.total = len(self._open)
-        self.most_attempts = 0
-        """Times the slowest answered question had to be asked."""
+        self._askings_of_answered = 0
 
     @property
     def open(self) -> tuple[Key, ...]:
@@ -95,6 +97,18 @@ class Exchange(Generic[Key]):
     def answered(self) -> int:
         """Number of questions answered."""
         return self.total - len(self._open)
+
+    @property
+    def telling_attempts(self) -> int:
+        """Askings after which silence means that there is no answer.
+
+        From how often the other questions had to be asked: a question that
+        has an answer stays silent so often once in a million times.
+        """
+        failures = self._askings_of_answered - self.answered
+        failure_rate = (failures + 1) / (self._askings_of_answered + 2)
+        needed = math.ceil(math.log(_MISTAKEN) / math.log(failure_rate))
+        return min(needed, self._timing.attempts)
 
     def halt(self) -> None:
         """Ask nothing more; only what is under way may still be answered."""
@@ -130,7 +144,7 @@ class Exchange(Generic[Key]):
         if question is None or question.attempts == 0:
             return False
         del self._open[key]
-        self.most_attempts = max(self.most_attempts, question.attempts)
+        self._askings_of_answered += question.attempts
         return True
 
     def differ(self, key: Key) -> int:

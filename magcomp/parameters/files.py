@@ -73,7 +73,8 @@ def as_float32(value: float) -> float:
 
 def format_value(value: float) -> str:
     """Give the shortest text that reads back to the same float32; whole numbers without point."""
-    return str(np.float32(value) + np.float32(0.0)).removesuffix(".0")
+    with np.errstate(over="ignore", under="ignore"):
+        return str(np.float32(value) + np.float32(0.0)).removesuffix(".0")
 
 
 def read_parameter_file(path: str | Path) -> ParameterSet:

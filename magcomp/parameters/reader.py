@@ -21,8 +21,9 @@ Rules
    move. A changed count, or another name at a known place, begins anew.
 2. Index 65535 is an echo of somebody's write: it renews a value already in
    the list and fills no place.
-3. An unknown name is answered by silence (PARAM_ERROR on newer firmware). It
-   is missing after three times the askings that the slowest other name took.
+3. An unknown name is answered by silence (PARAM_ERROR on newer firmware). How
+   often it must be asked before it counts as missing follows from how often
+   the known ones had to be asked.
 4. Without any message for ``silence`` seconds the link is lost.
 """
 
@@ -45,7 +46,6 @@ from magcomp.parameters.messages import (
 )
 
 _LIST_ATTEMPTS = 25
-_FEWEST_ATTEMPTS = 4
 
 
 class ReaderState(Enum):
@@ -228,8 +228,7 @@ class ParameterReader:
             self.state = ReaderState.DONE
             return []
         if self._values or self._missing:
-            patience = max(_FEWEST_ATTEMPTS, 3 * self._names.most_attempts)
-            silent = self._names.unanswered(now, min(patience, self._timing.attempts))
+            silent = self._names.unanswered(now, self._names.telling_attempts)
             # Only when nothing else is left to learn how lossy the link is.
             if len(silent) == len(self._names.open):
                 self._missing.extend(silent)

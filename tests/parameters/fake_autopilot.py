@@ -11,12 +11,12 @@ from __future__ import annotations
 import heapq
 import itertools
 import math
-import random
 import struct
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from magcomp.errors import LinkError
@@ -67,7 +67,9 @@ class FakeAutopilot:
     def __init__(
         self, values: Mapping[str, float], read_only: frozenset[str] = frozenset()
     ) -> None:
-        fixed = dict(zip(("COMPASS_DEV_ID", "COMPASS_DEV_ID2", "COMPASS_DEV_ID3"), DEVICES))
+        fixed = {
+            f"COMPASS_DEV_ID{n}": float(d) for n, d in zip(("", "2", "3"), DEVICES, strict=True)
+        }
         others = {f"OTHER_{n:03d}": float(n) for n in range(20)}
         scales = {"COMPASS_SCALE": 1.0, "COMPASS_SCALE2": 1.0, "COMPASS_SCALE3": 1.0}
         self.values: dict[str, float] = {
@@ -170,13 +172,16 @@ class Network:
     duplication: float = 0.0
     latency: float = 0.0025
     jitter: float = 0.0
-    random: random.Random = field(default_factory=lambda: random.Random(1))
+    seed: int = 1
+
+    def __post_init__(self) -> None:
+        self._random = np.random.default_rng(self.seed)
 
     def delays(self) -> list[float]:
-        if self.random.random() < self.loss:
+        if self._random.random() < self.loss:
             return []
-        copies = 2 if self.random.random() < self.duplication else 1
-        return [self.latency + self.jitter * self.random.random() for _ in range(copies)]
+        copies = 2 if self._random.random() < self.duplication else 1
+        return [self.latency + self.jitter * self._random.random() for _ in range(copies)]
 
 
 class FakeLink:
@@ -207,7 +212,7 @@ class FakeLink:
         self._ways: list[tuple[float, int, str, Any]] = []
         self._idle = 0
         self._schedule(clock.now + 0.1, "heartbeat", None)
-        self._schedule(clock.now + 0.15, "time", None)
+        self._schedule(clock.now + 0.05, "time", None)
 
     def send(self, message: Any) -> None:
         if self.broken:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import random
 from collections.abc import Callable
 from pathlib import Path
 
@@ -58,7 +57,7 @@ def test_thirty_per_cent_loss_each_way_and_200_ms_latency_are_survived(
     tmp_path: Path, seed: int
 ) -> None:
     autopilot, clock = FakeAutopilot(OLD), VirtualClock()
-    link = FakeLink(autopilot, clock, Network(**LOSSY, random=random.Random(seed)))
+    link = FakeLink(autopilot, clock, Network(**LOSSY, seed=seed))
     assert upload(link, tmp_path / "b.param") == Outcome(Standing.NEW)
     assert autopilot.calibration() == NEW
     assert_never_half_written(autopilot)
@@ -67,7 +66,7 @@ def test_thirty_per_cent_loss_each_way_and_200_ms_latency_are_survived(
 @pytest.mark.parametrize("seed", range(20))
 def test_duplicates_and_reordering_never_mix_old_and_new(tmp_path: Path, seed: int) -> None:
     autopilot, clock = FakeAutopilot(OLD), VirtualClock()
-    network = Network(0.2, 0.2, latency=0.02, jitter=0.5, random=random.Random(seed))
+    network = Network(0.2, 0.2, latency=0.02, jitter=0.5, seed=seed)
     link = FakeLink(autopilot, clock, network)
     assert upload(link, tmp_path / "b.param").good
     link.drain()
