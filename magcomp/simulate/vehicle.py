@@ -113,6 +113,16 @@ class Vehicle:
         return self._program_time(self._tick) >= self._program.duration_s
 
     @property
+    def heading_error(self) -> float:
+        """How far the autopilot's heading is off the true one, radians."""
+        return self._ahrs.heading_error or 0.0
+
+    @property
+    def true_position(self) -> FloatArray:
+        """Metres north, east and down from home, shape (3,)."""
+        return np.asarray(self._block.motion.position[-1])
+
+    @property
     def duration_s(self) -> float:
         """How long the programme takes."""
         return self._program.duration_s
@@ -174,7 +184,7 @@ class Vehicle:
             motion = self._pilot.before_start()
         else:
             begun = self._tick - self._program_tick
-            motion = self._pilot.block(begun, self._ahrs.heading_error or 0.0)
+            motion = self._pilot.block(begun, self.heading_error)
         self._obey(bool(motion.armed[-1]))
         self._autopilot.flying = bool(motion.position[-1, 2] < -_FLYING_M)
         self._physics, self._block = physics.advance(
