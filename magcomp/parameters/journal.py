@@ -170,10 +170,11 @@ def mark_restored(backup: Path) -> None:
     if not path.exists():
         return
     try:
-        with path.open("a", encoding="utf-8") as file:
-            # The program may have died in the middle of a line.
-            file.write("" if path.read_bytes().endswith(b"\n") else "\n")
-            file.write(json.dumps({"event": _RESTORED}) + "\n")
+        with path.open("r+b") as file:
+            # The program may have died in the middle of a line: that line is lost.
+            file.seek(file.read().rfind(b"\n") + 1)
+            file.truncate()
+            file.write(json.dumps({"event": _RESTORED}).encode() + b"\n")
             file.flush()
             os.fsync(file.fileno())
     except OSError as error:

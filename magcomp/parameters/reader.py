@@ -137,7 +137,7 @@ class ParameterReader:
 
     def poll(self, now: float) -> tuple[list[ReadProgress], list[Outgoing]]:
         """Tell what is to be reported and sent now."""
-        if not self.finished and now - self._heard > self._timing.silence:
+        if not self.finished and now >= self._heard + self._timing.silence:
             self.abandon(f"nothing was heard for {self._timing.silence:.0f} s")
         outgoing: list[Outgoing] = []
         match self.state:
