@@ -45,8 +45,6 @@ _MICROSECONDS = (Message.RAW_IMU, Message.SERVO_OUTPUT_RAW)
 # A recorder whose clock says that it is earlier than 2001 does not know the date.
 _EARLIEST_UNIX_S = 1.0e9
 
-SIMULATION_PREFIX = "SIM_"
-
 _LOOK = 1024
 _TEXT_SHARE = 0.95
 _PRINTABLE = frozenset(range(32, 127)) | {9, 10, 13}
@@ -156,13 +154,8 @@ def decode_vehicle(
 
 def _recording(decoded: Decoded, source: str) -> Recording:
     messages, who = decoded.messages, decoded.who
-    parameters = ParameterHistory(
-        tuple(
-            change
-            for change in quantities.parameters(messages, who.autopilot)
-            if not change.name.startswith(SIMULATION_PREFIX)
-        )
-    )
+    changes = quantities.parameters(messages, who.autopilot, simulation=False)
+    parameters = ParameterHistory(tuple(changes))
     heartbeats = messages[Message.HEARTBEAT]
     return Recording(
         source=source,

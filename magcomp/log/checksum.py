@@ -78,9 +78,9 @@ def checksums(
     state = np.empty(len(spans), dtype=np.intp)
     # "clip" only spares numpy a copy: no index is out of range.
     for at, n in enumerate(still_active[:-1].tolist()):
-        np.take(pairs[at:], position[:n], out=read[:n], mode="clip")
+        pairs[at:].take(position[:n], out=read[:n], mode="clip")
         np.bitwise_xor(read[:n], register[:n], out=state[:n])
-        np.take(step, state[:n], out=register[:n], mode="clip")
+        step.take(state[:n], out=register[:n], mode="clip")
     left = np.flatnonzero(spans & 1)
     register[left] = _add_byte(register[left], data[first[left] + spans[left] - 1])
     result[order] = _add_byte(register, extra[order])

@@ -109,4 +109,8 @@ def _payloads(data: ByteArray, start: OffsetArray, length: ByteArray, width: int
 
 def text(column: NDArray[np.bytes_]) -> list[str]:
     """Fixed-width character field as strings, each ended by its first NUL."""
-    return [raw.partition(b"\0")[0].decode("utf-8", "replace") for raw in column.tolist()]
+    entries = column.tolist()
+    joined = b"\0".join(entries)
+    if joined.count(b"\0") == len(entries) - 1:
+        return joined.decode("utf-8", "replace").split("\0")
+    return [entry.partition(b"\0")[0].decode("utf-8", "replace") for entry in entries]

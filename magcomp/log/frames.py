@@ -40,7 +40,7 @@ _LARGEST = _SMALLEST_V2 + 255 + _SIGNATURE_SIZE
 # Every time before the year 2112 has a first byte of 0 and a second one below 16.
 _LATEST_SECOND_BYTE = 16
 
-WINDOW = 1 << 20
+WINDOW = 1 << 19
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +117,7 @@ class _Candidates:
     length: OffsetArray
     message: NDArray[np.int32]
 
-    def __getitem__(self, rows: MaskArray | NDArray[np.intp]) -> _Candidates:
+    def __getitem__(self, rows: MaskArray | NDArray[np.intp] | slice) -> _Candidates:
         return _Candidates(**{f.name: getattr(self, f.name)[rows] for f in fields(self)})
 
 
@@ -154,11 +154,11 @@ def scan(
         # Frames that begin shortly after the window may still contradict one that ends there.
         found = _candidates(data, position, stop + _LARGEST)
         good = _verified(data, found, crc_extra)
-        sound = found[good]
+        sound = found if good.all() else found[good]
         sound = sound[_disjoint(sound.start, sound.end)]
         loose = _chained(data, found[~good], sound)
-        sound = sound[sound.start < stop]
-        loose = loose[loose.start < stop]
+        sound = sound[: int(np.searchsorted(sound.start, stop))]
+        loose = loose[: int(np.searchsorted(loose.start, stop))]
         system = _sequence_at(sound) + 1
         seen[(data[system].astype(np.uint16) << 8) | data[system + 1]] = True
         parts.append(_frames_of(data, sound[is_wanted[sound.message]]))
@@ -221,19 +221,16 @@ def _lookup(
 
 def _verified(data: ByteArray, found: _Candidates, crc_extra: NDArray[np.int16]) -> MaskArray:
     """Which candidates carry the right checksum, shape (n,)."""
+    if not len(found.start):
+        return np.zeros(0, dtype=bool)
     extra = _lookup(crc_extra, found.message, default=-1)
-    known = np.flatnonzero(extra >= 0)
-    result = np.zeros(len(extra), dtype=bool)
-    if not len(known):
-        return result
-    some = found[known]
-    low = int(some.start[0])
-    region = data[low : int(some.end.max())]
-    covered = some.start + STAMP_SIZE + 1
-    size = some.payload + some.length - covered
-    computed = checksums(region, covered - low, size, extra[known].astype(np.uint8))
-    result[known] = computed == _checksum_sent(data, some)
-    return result
+    low = int(found.start[0])
+    first = found.start + (STAMP_SIZE + 1 - low)
+    length = found.payload + found.length - low - first
+    region = data[low : int(found.end.max())]
+    computed = checksums(region, first, length, extra.astype(np.uint8))
+    right: MaskArray = (computed == _checksum_sent(data, found)) & (extra >= 0)
+    return right
 
 
 def _checksum_sent(data: ByteArray, found: _Candidates) -> WordArray:
@@ -262,11 +259,11 @@ def _chained(data: ByteArray, doubtful: _Candidates, sound: _Candidates) -> _Can
     return chosen[_disjoint(chosen.start, chosen.end)]
 
 
-def _disjoint(start: OffsetArray, end: OffsetArray) -> NDArray[np.intp]:
+def _disjoint(start: OffsetArray, end: OffsetArray) -> NDArray[np.intp] | slice:
     """Rows left when, going through the sorted spans, each one that overlaps a kept one goes."""
-    rows = np.arange(len(start), dtype=np.intp)
     if (start[1:] >= end[:-1]).all():
-        return rows
+        return slice(None)
+    rows = np.arange(len(start), dtype=np.intp)
     following = np.searchsorted(start, end, side="left")
     breaks = np.flatnonzero(following != rows + 1)
     runs = []

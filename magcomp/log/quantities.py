@@ -23,6 +23,8 @@ _FIX_3D = 3
 # MAV_PARAM_TYPE of integers; PX4 sends their bytes in the place of the float.
 _INTEGER_TYPES = {1: "<u1", 2: "<i1", 3: "<u2", 4: "<i2", 5: "<u4", 6: "<i4"}
 
+_SIMULATION_PREFIX = "SIM_"
+
 # "ArduCopter V4.6.3 (92b0cd78)", "APM:Copter V3.4-dev (bdddfae5)"
 _BANNER = re.compile(r"^(?:Ardu|APM:)\w+ V(\d+\.\d+(?:\.\d+)?[\w.-]*)")
 
@@ -123,10 +125,19 @@ def position(messages: Messages) -> Series | None:
     return _series(time, _degrees_and_metres(table), table["fix_type"] >= _FIX_3D)
 
 
-def parameters(messages: Messages, autopilot: str) -> list[ParameterChange]:
+def parameters(messages: Messages, autopilot: str, simulation: bool) -> list[ParameterChange]:
     """Every value reported, in order of time. Not finite ones stay: they are refused by name.
 
     ArduPilot casts integers to float; PX4 puts their bytes in its place.
+
+    Parameters
+    ----------
+    messages
+        One vehicle's messages.
+    autopilot
+        ``"ardupilot"`` or ``"px4"``.
+    simulation
+        True for the SIM_* parameters alone, False for all others.
     """
     if Message.PARAM_VALUE not in messages:
         return []
@@ -138,8 +149,11 @@ def parameters(messages: Messages, autopilot: str) -> list[ParameterChange]:
             rows = table["param_type"] == kind
             width = np.dtype(code).itemsize
             value[rows] = np.ascontiguousarray(raw[rows, :width]).view(code)[:, 0]
-    names = text(table["param_id"])
-    return list(map(ParameterChange, time.tolist(), names, value.tolist()))
+    return [
+        ParameterChange(*change)
+        for change in zip(time.tolist(), text(table["param_id"]), value.tolist(), strict=True)
+        if change[1].startswith(_SIMULATION_PREFIX) is simulation
+    ]
 
 
 def firmware(messages: Messages) -> str:

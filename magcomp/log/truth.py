@@ -14,7 +14,7 @@ import numpy as np
 from pymavlink.dialects.v20.ardupilotmega import MAVLINK_MSG_ID_SIMSTATE
 
 from magcomp.errors import MissingDataError
-from magcomp.log.assemble import SIMULATION_PREFIX, decode_vehicle
+from magcomp.log.assemble import decode_vehicle
 from magcomp.log.columns import WANTED
 from magcomp.log.quantities import columns, parameters
 from magcomp.log.source import mapped
@@ -61,14 +61,9 @@ def read_truth(path: str | Path, *, system: int | None = None) -> Truth:
     time, table = decoded.messages[MAVLINK_MSG_ID_SIMSTATE]
     attitude = columns(table, "roll", "pitch", "yaw")
     sound = np.isfinite(attitude).all(axis=1)
+    changes = parameters(decoded.messages, decoded.who.autopilot, simulation=True)
     return Truth(
         attitude=Series(time[sound], attitude[sound]),
         position=Series(time[sound], columns(table, "lat", "lng")[sound] * 1e-7),
-        parameters=MappingProxyType(
-            {
-                change.name: change.value
-                for change in parameters(decoded.messages, decoded.who.autopilot)
-                if change.name.startswith(SIMULATION_PREFIX)
-            }
-        ),
+        parameters=MappingProxyType({change.name: change.value for change in changes}),
     )
