@@ -16,6 +16,7 @@ from magcomp.fit.flight import (
     Problem,
     correction_of,
     estimate,
+    estimate_lags,
     lags_of,
     vertical_of,
 )
@@ -84,7 +85,7 @@ def fit(problem: Problem, method: str = "auto") -> MotorFit:
         rows, level = usable_levels(problem)
         count = len(np.unique(level))
         if count >= 2 and (method == "levels" or len(rows) > 0.4 * len(samples)):
-            return fit_levels(problem, rows, level)[0]
+            return _with_lags(problem, fit_levels(problem, rows, level)[0])
         if method == "levels":
             raise FitRejectedError(
                 "The method of levels needs turns about all axes at two or more steady levels of "
@@ -108,9 +109,10 @@ def refit(problem: Problem, fit: MotorFit, keep: BoolArray) -> MotorFit:
         return fit_sweep(part, lag=fit.lags.regressor)
     if fit.method == "levels":
         rows, level = usable_levels(part)
-        if len(np.unique(level)) >= 2:
-            return fit_levels(part, rows, level)[0]
-        return fit
+        if len(np.unique(level)) < 2:
+            return fit
+        again = fit_levels(part, rows, level)[0]
+        return replace(again, lags=fit.lags, lags_std=fit.lags_std, vertical=fit.vertical)
     start = np.concatenate(
         [
             pack(fit.correction),
@@ -119,6 +121,19 @@ def refit(problem: Problem, fit: MotorFit, keep: BoolArray) -> MotorFit:
     )
     found = estimate(part, _groups(fit), start=start, hold_lags=True, with_covariance=False)
     return _updated(fit, found)
+
+
+def _with_lags(problem: Problem, fit: MotorFit) -> MotorFit:
+    lags, std = estimate_lags(problem, fit.correction)
+    vertical = np.einsum("ij,ij->i", *_corrected_and_down(problem, fit, lags))
+    return replace(fit, lags=lags, lags_std=std, vertical=float(np.median(vertical)))
+
+
+def _corrected_and_down(
+    problem: Problem, fit: MotorFit, lags: Lags
+) -> tuple[FloatArray, FloatArray]:
+    samples = problem.sample(lags)
+    return fit.correction.apply(samples.raw, samples.u), samples.down
 
 
 def fit_flight(problem: Problem) -> MotorFit:

@@ -176,6 +176,31 @@ def estimate(
     )
 
 
+def estimate_lags(problem: Problem, correction: Correction) -> tuple[Lags, Lags]:
+    """Both lags and their standard errors for a correction that is known already.
+
+    Parameters
+    ----------
+    problem
+        The data, transitions of the control quantity included.
+    correction
+        Found by a method that does not need the lags.
+    """
+    known = prior(problem, 1)
+    width, begin = known.width.copy(), known.mean.copy()
+    width[:CORRECTION_SIZE] = 0.0
+    begin[:CORRECTION_SIZE] = pack(correction)
+    found = solve(
+        lambda p: strength_and_dip(problem.sample(lags_of(p)), p),
+        begin,
+        Prior(begin, width),
+        blocks=time_blocks(problem.readings.time, BLOCK_S),
+        feasible=is_physical,
+    )
+    field, regressor = np.sqrt(np.diag(found.covariance))[[FIELD_LAG, REGRESSOR_LAG]]
+    return lags_of(found.parameters), Lags(float(field), float(regressor))
+
+
 def _doubt(known: Prior) -> Prior:
     """The prior with the trusted soft iron as uncertain as an ordinary calibration leaves it."""
     width = known.width.copy()

@@ -146,6 +146,10 @@ def solve(
     )
 
 
+def _columns(slopes: FloatArray, moving: BoolArray) -> FloatArray:
+    return slopes if moving.all() else slopes[:, :, moving]
+
+
 def _spread(values: FloatArray, floor: float) -> FloatArray:
     return np.maximum(_MAD_TO_STD * np.median(np.abs(values), axis=0), floor)
 
@@ -179,7 +183,7 @@ def _descend(
     damping = _DAMPING_START
     for _ in range(_STEPS):
         weights = _weights(values / scale) / scale**2
-        design = slopes[:, :, moving].reshape(-1, int(moving.sum()))
+        design = _columns(slopes, moving).reshape(-1, int(moving.sum()))
         weighted = design * weights.reshape(-1, 1)
         hessian = design.T @ weighted + np.diag(precision)
         gradient = weighted.T @ values.reshape(-1) + precision * (parameters - prior.mean)[moving]
@@ -215,7 +219,7 @@ def _covariance(
     """Sandwich covariance with scores summed over blocks, shrunk where blocks are few."""
     moving = prior.width > 0.0
     size = int(moving.sum())
-    design = slopes[:, :, moving]
+    design = _columns(slopes, moving)
     flat = design.reshape(-1, size)
     data = flat.T @ (flat * weights.reshape(-1, 1))
     precision = np.diag(prior.precision[moving])

@@ -53,8 +53,11 @@ def _change(control: Series, samples: Samples) -> FloatArray:
     first = np.searchsorted(control.time, samples.time - WINDOW_S, side="left")
     last = np.searchsorted(control.time, samples.time + WINDOW_S, side="right")
     change = np.full(len(samples), np.inf)
-    for row in range(len(samples)):
-        window = control.value[first[row] : last[row]]
-        if len(window):
-            change[row] = max(np.max(window) - samples.u[row], samples.u[row] - np.min(window))
+    seen = last > first
+    # reduceat over interleaved starts and ends; every other result is the window's.
+    padded = np.append(control.value, control.value[-1])
+    bounds = np.column_stack([first[seen], last[seen]]).reshape(-1)
+    highest = np.maximum.reduceat(padded, bounds)[::2]
+    lowest = np.minimum.reduceat(padded, bounds)[::2]
+    change[seen] = np.maximum(highest - samples.u[seen], samples.u[seen] - lowest)
     return change

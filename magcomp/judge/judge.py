@@ -148,7 +148,7 @@ def _on_unseen(
 ) -> Iterator[_Finding]:
     at_top = error_at(errors, fit.u_high)
     claims = at_top.before > at_top.p95
-    fall = 1.0 - residual.held_out / residual.held_out_before if residual.held_out_before else 0.0
+    fall = _fall(residual)
     if claims and fall < 0.0:
         yield _Finding(
             Grade.REJECTED,
@@ -164,16 +164,20 @@ def _on_unseen(
         )
 
 
+def _fall(residual: FieldResidual) -> float:
+    """Share of the held-out field variation that the fit removes."""
+    before = residual.held_out_before
+    return 1.0 - residual.held_out / before if before > 0.0 else 0.0
+
+
 def _on_bound(
     fit: MotorFit, errors: tuple[HeadingError, ...], limits: Thresholds
 ) -> Iterator[_Finding]:
     at_top = error_at(errors, fit.u_high)
-    if at_top.p95 > limits.marginal_deg:
-        grade = Grade.REJECTED
-    elif at_top.p95 > limits.good_deg:
-        grade = Grade.MARGINAL
-    else:
+    if at_top.p95 <= limits.good_deg:
         return
+    tolerable = max(limits.marginal_deg, limits.lesser_evil * at_top.before)
+    grade = Grade.MARGINAL if at_top.p95 <= tolerable else Grade.REJECTED
     yield _Finding(
         grade,
         f"the heading could still be wrong by {at_top.p95:.1f}° at {_quantity(fit, at_top.u)}: "
@@ -192,7 +196,7 @@ def _on_shape(
         )
     if residual.held_out > limits.noise_share * fit.strength:
         yield _Finding(
-            Grade.MARGINAL,
+            Grade.MARGINAL if _fall(residual) > limits.worthwhile else Grade.REJECTED,
             f"{residual.held_out:.0f} mGauss of {fit.strength:.0f} stay unexplained: look for "
             "iron, loose wiring or other currents near this compass",
         )
@@ -209,8 +213,13 @@ def _on_shape(
 
 
 def error_at(errors: tuple[HeadingError, ...], u: float) -> HeadingError:
-    """The row of the table for a control quantity: the first at or above it, else the last."""
-    return next((row for row in errors if row.u >= u - 1e-9), errors[-1])
+    """The table at a control quantity, linearly between its rows."""
+    grid = [row.u for row in errors]
+    before, after, p95 = (
+        float(np.interp(u, grid, [getattr(row, name) for row in errors]))
+        for name in ("before", "after", "p95")
+    )
+    return HeadingError(u, before, after, p95)
 
 
 def _quantity(fit: MotorFit, u: float) -> str:

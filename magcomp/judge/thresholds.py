@@ -21,9 +21,13 @@ class Thresholds:
     heading, bends
         Share of a full turn that must be seen in flight, and the distance of the centres from
         their line, as a share of its length, beyond which the line is not one.
-    noise_share
+    noise_share, worthwhile
         Unexplained field after the fit, as a share of the field's strength, beyond which
-        something else than the motors disturbs the compass.
+        something else than the motors disturbs the compass; the correction is then only worth
+        having where it removes at least the share ``worthwhile`` of what was unexplained.
+    lesser_evil
+        A bound beyond ``marginal_deg`` is still marginal, not rejected, where it is below this
+        share of the error in force.
     """
 
     good_deg: float = 3.0
@@ -34,3 +38,5 @@ class Thresholds:
     heading: float = 0.6
     bends: float = 0.15
     noise_share: float = 0.04
+    worthwhile: float = 0.25
+    lesser_evil: float = 1 / 3
