@@ -95,33 +95,36 @@ def time_axis(
         Shape (n,). Not sorted: frames may stand in the log in another order.
     """
     stream = _Stream(arrival, place)
-    leaders = [_merged(leading), *others] if leading else [*others]
+    n = len(arrival)
+    leaders = [_merged(leading, n), *others] if leading else [*others]
     usable = [stamps for stamps in leaders if _runs(stamps)]
     if not usable:
         return _recorder_axis(arrival)
     leader, *followers = usable
     elapsed = _unroll(leader, arrival[leader.rows])
     settled = [_settle(stamps, leader, elapsed, stream) for stamps in followers]
-    sent = [s for s, stamps in zip(settled, followers, strict=True) if stamps.at_sending]
-    rows = np.concatenate([leader.rows, *(s.rows for s in sent)])
-    time = np.concatenate([elapsed, *(s.time for s in sent)])
-    order = np.argsort(rows, kind="stable")
-    anchors, time = rows[order], time[order]
-    axis = np.zeros(len(arrival), dtype=np.int64)
-    bare = np.ones(len(arrival), dtype=bool)
-    axis[anchors], bare[anchors] = time, False
-    axis[bare] = _between(time, anchors, np.flatnonzero(bare), stream)
+    axis = np.zeros(n, dtype=np.int64)
+    is_anchor = np.zeros(n, dtype=bool)
+    axis[leader.rows], is_anchor[leader.rows] = elapsed, True
+    for stamps, own in zip(followers, settled, strict=True):
+        if stamps.at_sending:
+            axis[own.rows], is_anchor[own.rows] = own.time, True
+    anchors, bare = np.flatnonzero(is_anchor), np.flatnonzero(~is_anchor)
+    axis[bare] = _between(axis[anchors], anchors, bare, stream)
     for own in settled:
         axis[own.rows] = own.time
     return axis.astype(np.float64) / SECOND
 
 
-def _merged(group: Sequence[Stamps]) -> Stamps:
+def _merged(group: Sequence[Stamps], n: int) -> Stamps:
     """Stamps of one clock from several messages, in the order of the stream."""
-    rows = np.concatenate([stamps.rows for stamps in group])
-    order = np.argsort(rows, kind="stable")
-    time = np.concatenate([stamps.time for stamps in group])[order]
-    return Stamps(rows[order], time, group[0].wrap)
+    if len(group) == 1:
+        return group[0]
+    time = np.full(n, NO_STAMP, dtype=np.int64)
+    for stamps in group:
+        time[stamps.rows] = stamps.time
+    rows = np.flatnonzero(time != NO_STAMP)
+    return Stamps(rows, time[rows], group[0].wrap)
 
 
 def _runs(stamps: Stamps) -> bool:

@@ -193,22 +193,21 @@ def _candidates(data: ByteArray, low: int, high: int) -> _Candidates:
     size = len(data)
     start = _looks_like_record(data, low, max(low, min(high, size - _SMALLEST_V1 + 1)))
     second = data[start + STAMP_SIZE] == MAGIC_V2
-    fits = ~second | (start <= size - _SMALLEST_V2)
-    start, second = start[fits], second[fits]
-    length = data[start + 9].astype(np.int64)
-    flags = np.where(second, data[start + 10], 0)
-    header = np.where(second, _HEADER_V2, _HEADER_V1)
-    payload = start + STAMP_SIZE + header
-    end = payload + length + _CHECKSUM_SIZE + _SIGNATURE_SIZE * (flags & _SIGNED)
+    length = data[start + 9]
     # A frame with flags that this reader does not know must not be decoded (MAVLink guide).
+    flags = np.where(second, data[start + 10], 0)
+    payload = start + np.where(second, STAMP_SIZE + _HEADER_V2, STAMP_SIZE + _HEADER_V1)
+    end = payload + length + np.where(flags, _CHECKSUM_SIZE + _SIGNATURE_SIZE, _CHECKSUM_SIZE)
     whole = (end <= size) & (flags <= _SIGNED)
-    start, second, payload = start[whole], second[whole], payload[whole]
+    if not whole.all():
+        start, second, length = start[whole], second[whole], length[whole]
+        payload, end = payload[whole], end[whole]
     at = payload - np.where(second, 3, 1)
     message = data[at].astype(np.int32)
-    wide = np.flatnonzero(second)
+    wide = slice(None) if second.all() else np.flatnonzero(second)
     message[wide] |= data[at[wide] + 1].astype(np.int32) << 8
     message[wide] |= data[at[wide] + 2].astype(np.int32) << 16
-    return _Candidates(start, end[whole], payload, length[whole], message)
+    return _Candidates(start, end, payload, length.astype(np.int64), message)
 
 
 def _lookup(
