@@ -8,6 +8,7 @@ know turns its heading, as in the air.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,12 +42,17 @@ class Ahrs:
 
     def attitude(self, earth_from_body: FloatArray) -> FloatArray:
         """Estimated roll, pitch and yaw, radians, shape (n, 3)."""
-        vector = np.array([self.tilt[0], self.tilt[1], 0.0])
-        angle = float(np.linalg.norm(vector))
-        tilted = rotation(vector / angle if angle else _UP, np.asarray(angle)) @ earth_from_body
-        estimate = euler(tilted)
+        estimate = euler(self._tilted @ earth_from_body)
         estimate[..., 2] = geometry.wrap_angle(estimate[..., 2] + (self.heading_error or 0.0))
         return estimate
+
+    @cached_property
+    def _tilted(self) -> FloatArray:
+        """The tilt error as a rotation, (3, 3)."""
+        north, east = self.tilt
+        angle = float(np.hypot(north, east))
+        axis = np.array([north / angle, east / angle, 0.0]) if angle else _UP
+        return rotation(axis, np.asarray(angle))
 
     def updated(
         self,

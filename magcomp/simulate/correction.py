@@ -31,7 +31,7 @@ class Correction:
         self._sensors: list[int] = []
 
     def correct(
-        self, raw: FloatArray, throttle: float, current: float, per_motor: FloatArray
+        self, raw: FloatArray, throttle: float, current: float, per_motor: FloatArray | None
     ) -> FloatArray:
         """Corrected fields in priority order, mGauss, shape (3, 3).
 
@@ -42,7 +42,8 @@ class Correction:
         throttle, current
             Thrust demand 0 … 1 and battery current in A.
         per_motor
-            Duty of each motor times the battery's voltage, V, shape (4,).
+            Duty of each motor times the battery's voltage, V, shape (4,); None where
+            COMPASS_PMOT_EN is off.
         """
         if self._version != self._store.version:
             self._read()
@@ -55,7 +56,7 @@ class Correction:
             ardupilot.correct(raw[sensor], u[calibration.compensation], calibration)
             for sensor, calibration in zip(self._sensors, self._calibrations, strict=True)
         ]
-        if self._store["COMPASS_PMOT_EN"]:
+        if per_motor is not None:
             fields[0] = self._per_motor(raw[self._sensors[0]], per_motor)
         return np.stack(fields)
 

@@ -11,6 +11,15 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
+# The cross products with x, y and z as matrices.
+_CROSS = np.array(
+    [
+        [[0.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]],
+        [[0.0, 0.0, 1.0], [0.0, 0.0, 0.0], [-1.0, 0.0, 0.0]],
+        [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]],
+    ]
+)
+
 
 @dataclass(frozen=True, eq=False)
 class Motion:
@@ -86,9 +95,7 @@ def still(earth_from_body: FloatArray, throttle: FloatArray, armed: BoolArray) -
 
 def rotation(axis: FloatArray, angle: FloatArray) -> FloatArray:
     """Rotation about unit vectors, shape (n, 3), by angles in radians, shape (n,): (n, 3, 3)."""
-    x, y, z = np.moveaxis(axis, -1, 0)
-    zero = np.zeros_like(x)
-    cross = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*x.shape, 3, 3)
+    cross = np.tensordot(axis, _CROSS, 1)
     sine, cosine = np.sin(angle)[..., None, None], np.cos(angle)[..., None, None]
     return np.asarray(np.eye(3) + sine * cross + (1 - cosine) * (cross @ cross))
 

@@ -7,6 +7,7 @@ the autopilot takes between two compass readings. Nothing here knows MAVLink.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -154,7 +155,7 @@ def advance(
 
     rates = _body_rates(state.pose, motion.earth_from_body)
     gravity = np.array([0.0, 0.0, GRAVITY])
-    force = np.einsum("nij,nj->ni", body_from_earth, motion.acceleration - gravity)
+    force = (body_from_earth @ (motion.acceleration - gravity)[..., None])[..., 0]
     shape = (2, STEPS, 3)
     gyro = rates + state.gyro_bias[:, None] + rng.normal(scale=_GYRO_NOISE, size=shape)
     accel = force + state.accel_bias[:, None] + rng.normal(scale=_ACCEL_NOISE, size=shape)
@@ -209,11 +210,18 @@ def _open_circuit(truth: Truth, used_ah: float) -> float:
 
 def _lag(before: FloatArray, wanted: FloatArray, time_constant: float) -> FloatArray:
     """First-order lag of ``wanted``, shape (n, k), that stood at ``before``, shape (k,)."""
+    weights, memory = _lag_weights(len(wanted), time_constant)
+    return np.asarray(weights @ wanted + memory * before)
+
+
+@lru_cache
+def _lag_weights(count: int, time_constant: float) -> tuple[FloatArray, FloatArray]:
+    """How much each earlier input, shape (n, n), and the old state, (n, 1), still count."""
     keep = np.exp(-STEP_S / time_constant)
-    steps = np.arange(len(wanted))
+    steps = np.arange(count)
     age = steps[:, None] - steps
     weights = np.where(age >= 0, (1 - keep) * keep ** np.maximum(age, 0), 0.0)
-    return np.asarray(weights @ wanted + np.multiply.outer(keep ** (steps + 1), before))
+    return weights, keep ** (steps[:, None] + 1.0)
 
 
 def _body_rates(before: FloatArray | None, pose: FloatArray) -> FloatArray:

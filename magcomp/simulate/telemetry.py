@@ -117,7 +117,7 @@ def build(message: int, view: View) -> Any | None:
 
 def _whole(value: FloatArray) -> list[int]:
     """Cut towards zero and keep within 16 bits, as the firmware's conversion does."""
-    return [int(v) for v in np.clip(np.trunc(value), -32768, 32767)]
+    return [min(max(int(each), -32768), 32767) for each in value.tolist()]
 
 
 def _centiamperes(battery: Battery) -> int:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -108,7 +109,11 @@ class CompassTruth:
         -----
         PAPER.md equation 3: D⁻¹·field − OFS.
         """
-        return np.asarray(np.linalg.solve(self.soft_iron, field[..., None])[..., 0] - self.offset)
+        return np.asarray(field @ self._distortion.T - self.offset)
+
+    @cached_property
+    def _distortion(self) -> FloatArray:
+        return np.asarray(np.linalg.inv(self.soft_iron))
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,6 +34,9 @@ _HEARTBEAT_TICKS = 100
 _TIMESYNC_TICKS = 1000
 _BOOT_TICKS = 150
 _FLYING_M = 0.5
+# MAVLink 2 signatures count tens of microseconds since 2015-01-01.
+_SIGNING_EPOCH_S = 1_420_070_400
+_SIGNING_TICKS_PER_S = 100_000
 
 
 class Frame(NamedTuple):
@@ -56,6 +59,8 @@ class Vehicle:
         Parameters that differ from the scenario's, by name.
     wait_for_ground
         Hold the programme until the first message from a ground station.
+    signing_key
+        32 bytes: sign every frame, and take none from the ground that is not signed with it.
     system
         MAVLink system number.
     """
@@ -67,6 +72,7 @@ class Vehicle:
         start_unix_s: float = DEFAULT_START_UNIX_S,
         parameters: Mapping[str, float] | None = None,
         wait_for_ground: bool = False,
+        signing_key: bytes | None = None,
         system: int = 1,
     ) -> None:
         self.truth = scenario.truth
@@ -77,11 +83,12 @@ class Vehicle:
         self._store = ParameterStore({**initial_values(scenario.truth), **(parameters or {})})
         self._autopilot = Autopilot(self._store, system)
         self._correction = Correction(self._store)
-        self._codec: Any = mavlink.MAVLink(None, srcSystem=system, srcComponent=1)
-        self._rng = np.random.default_rng([scenario.truth.seed, 3])
-        self._field = earth.expected_field(*scenario.truth.home, start_unix_s)
+        self._signing_key = signing_key
         self._tick = 0
         self._boot_tick = 0
+        self._codec = self._new_codec()
+        self._rng = np.random.default_rng([scenario.truth.seed, 3])
+        self._field = earth.expected_field(*scenario.truth.home, start_unix_s)
         self._program_tick: int | None = None if wait_for_ground else 0
         self._wants_armed = False
         self._sent: list[Frame] = []
@@ -152,12 +159,23 @@ class Vehicle:
     def reboot(self) -> None:
         """Restart: motors off, streams forgotten, stored parameters kept, a moment's silence."""
         self._boot_tick = self._tick + _BOOT_TICKS
-        self._codec = mavlink.MAVLink(
-            None, srcSystem=self._codec.srcSystem, srcComponent=self._codec.srcComponent
-        )
+        self._codec = self._new_codec()
         self._autopilot.start_up()
         self._ahrs = Ahrs(tilt=np.zeros(2))
         self._wants_armed = False
+
+    def _new_codec(self) -> Any:
+        """Sequence numbers from 0; signatures stamped with the vehicle's own time."""
+        autopilot = self._autopilot
+        codec: Any = mavlink.MAVLink(
+            None, srcSystem=autopilot.system, srcComponent=autopilot.component
+        )
+        if self._signing_key is not None:
+            codec.signing.secret_key = self._signing_key
+            codec.signing.sign_outgoing = True
+            since = self._start_unix_s + self.time - _SIGNING_EPOCH_S
+            codec.signing.timestamp = round(since * _SIGNING_TICKS_PER_S)
+        return codec
 
     @property
     def _boot_ms(self) -> int:
@@ -206,7 +224,7 @@ class Vehicle:
         """What ArduCopter does ten times a second."""
         block = self._block
         # Each sample of this reading was corrected with what was known when it began.
-        drive = self._duty(block.demand[0]) * block.sensed_v
+        drive = self._drive() if self._store["COMPASS_PMOT_EN"] else None
         current = 0.0 if self._battery is None else self._battery.current
         self._corrected = self._correction.correct(block.raw, self._throttle, current, drive)
         self._battery = self._read_battery()
@@ -236,9 +254,11 @@ class Vehicle:
             parameters=self._store.values,
         )
 
-    def _duty(self, demand: FloatArray) -> FloatArray:
+    def _drive(self) -> FloatArray:
+        """Duty of each motor times the battery's voltage, V, shape (4,)."""
         low, high = self._store["MOT_PWM_MIN"], self._store["MOT_PWM_MAX"]
-        return np.clip((self._outputs(demand) - low) / max(high - low, 1.0), 0.0, 1.0)
+        duty = (self._outputs(self._block.demand[0]) - low) / max(high - low, 1.0)
+        return np.asarray(np.clip(duty, 0.0, 1.0) * self._block.sensed_v)
 
     def _speak(self, step: int) -> None:
         """Send what is due at this tick."""
