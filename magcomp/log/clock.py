@@ -110,7 +110,8 @@ def time_axis(
         if stamps.at_sending:
             axis[own.rows], is_anchor[own.rows] = own.time, True
     anchors, bare = np.flatnonzero(is_anchor), np.flatnonzero(~is_anchor)
-    axis[bare] = _between(axis[anchors], anchors, bare, stream)
+    around = _neighbours(anchors, bare, n)
+    axis[bare] = _between(axis[anchors], anchors, bare, around, stream)
     for own in settled:
         axis[own.rows] = own.time
     return axis.astype(np.float64) / SECOND
@@ -155,7 +156,7 @@ def _unroll(stamps: Stamps, arrival: OffsetArray) -> OffsetArray:
 def _settle(stamps: Stamps, leader: Stamps, elapsed: OffsetArray, stream: _Stream) -> _Settled:
     """Times of another kind of message on the leading axis, where both agree."""
     before, after = _neighbours(leader.rows, stamps.rows, len(stream.arrival))
-    expected = _between(elapsed, leader.rows, stamps.rows, stream)
+    expected = _between(elapsed, leader.rows, stamps.rows, (before, after), stream)
     room = np.abs(elapsed[after] - elapsed[before]) + _DISORDER
     best = np.full(len(stamps.rows), np.iinfo(np.int64).max)
     settled = np.zeros(len(stamps.rows), dtype=np.int64)
@@ -183,7 +184,11 @@ def _neighbours(
 
 
 def _between(
-    time: OffsetArray, anchors: NDArray[np.intp], rows: NDArray[np.intp], stream: _Stream
+    time: OffsetArray,
+    anchors: NDArray[np.intp],
+    rows: NDArray[np.intp],
+    neighbours: tuple[NDArray[np.intp], NDArray[np.intp]],
+    stream: _Stream,
 ) -> OffsetArray:
     """Times of some rows by their place between anchors whose times are known, shape (n,).
 
@@ -191,11 +196,12 @@ def _between(
     other: a vehicle sends in bursts, and the place in the stream alone would spread them evenly.
     """
     arrival, place = stream.arrival[rows], stream.place[rows]
-    before, after = _neighbours(anchors, rows, len(stream.arrival))
-    from_arrival = stream.arrival[anchors][before]
-    from_place = stream.place[anchors][before]
-    share = (place - from_place) / np.maximum(stream.place[anchors][after] - from_place, 1)
-    waited = stream.arrival[anchors][after] - from_arrival
+    before, after = neighbours
+    last, following = anchors[before], anchors[after]
+    from_arrival = stream.arrival[last]
+    from_place = stream.place[last]
+    share = (place - from_place) / np.maximum(stream.place[following] - from_place, 1)
+    waited = stream.arrival[following] - from_arrival
     into = arrival - from_arrival
     told = (into >= 0) & (into <= waited) & (waited > 0)
     share[told] = into[told] / waited[told]

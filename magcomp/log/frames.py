@@ -153,10 +153,7 @@ def scan(
         stop = position + window
         # Frames that begin shortly after the window may still contradict one that ends there.
         found = _candidates(data, position, stop + _LARGEST)
-        good = _verified(data, found, crc_extra)
-        sound = found if good.all() else found[good]
-        sound = sound[_disjoint(sound.start, sound.end)]
-        loose = _chained(data, found[~good], sound)
+        sound, loose = _sorted_out(data, found, crc_extra)
         sound = sound[: int(np.searchsorted(sound.start, stop))]
         loose = loose[: int(np.searchsorted(loose.start, stop))]
         system = _sequence_at(sound) + 1
@@ -238,24 +235,57 @@ def _checksum_sent(data: ByteArray, found: _Candidates) -> WordArray:
     return sent
 
 
-def _chained(data: ByteArray, doubtful: _Candidates, sound: _Candidates) -> _Candidates:
-    """Candidates without a right checksum that the records around them still confirm."""
-    size = len(data)
-    follows = doubtful.end == size
-    room = np.flatnonzero(doubtful.end <= size - _SMALLEST_V1)
-    at = doubtful.end[room]
-    first = data[at + STAMP_SIZE]
-    follows[room] = (
-        ((first == MAGIC_V1) | (first == MAGIC_V2))
-        & (data[at] == 0)
-        & (data[at + 1] < _LATEST_SECOND_BYTE)
+def _sorted_out(
+    data: ByteArray, found: _Candidates, crc_extra: NDArray[np.int16]
+) -> tuple[_Candidates, _Candidates]:
+    """Candidates that are verified frames, and those that are frames by their place alone."""
+    followed = _followed(data, found)
+    likely = found if followed.all() else found[followed]
+    right = _verified(data, likely, crc_extra)
+    sound = likely if right.all() else likely[right]
+    sound = sound[_disjoint(sound.start, sound.end)]
+    # False starts within sound frames are many and need no checksum; a sound frame before garbage
+    # is followed by nothing and does.
+    unlikely = found[~followed]
+    unlikely = unlikely[_free_of(sound, unlikely.start, unlikely.start + 1)]
+    late = unlikely[_verified(data, unlikely, crc_extra)]
+    if len(late.start):
+        sound = _in_order(sound, late)
+        sound = sound[_disjoint(sound.start, sound.end)]
+    loose = likely[~right]
+    loose = loose[_free_of(sound, loose.start, loose.end)]
+    return sound, loose[_disjoint(loose.start, loose.end)]
+
+
+def _followed(data: ByteArray, found: _Candidates) -> MaskArray:
+    """Which candidates end where another record begins or the data end, shape (n,)."""
+    last = len(data) - STAMP_SIZE - 1
+    at = np.minimum(found.end, max(last, 0))
+    magic = data[np.minimum(at + STAMP_SIZE, len(data) - 1)]
+    record = (magic == MAGIC_V1) | (magic == MAGIC_V2)
+    record &= (data[at] == 0) & (data[np.minimum(at + 1, len(data) - 1)] < _LATEST_SECOND_BYTE)
+    followed: MaskArray = (record & (found.end <= last)) | (found.end == len(data))
+    return followed
+
+
+def _free_of(sound: _Candidates, start: OffsetArray, end: OffsetArray) -> MaskArray:
+    """Which spans overlap none of the sound frames, shape (n,)."""
+    if not len(sound.start):
+        return np.ones(len(start), dtype=bool)
+    before = np.searchsorted(sound.start, end, side="left") - 1
+    free: MaskArray = (before < 0) | (sound.end[np.maximum(before, 0)] <= start)
+    return free
+
+
+def _in_order(one: _Candidates, other: _Candidates) -> _Candidates:
+    """Both together by their start."""
+    both = _Candidates(
+        **{
+            f.name: np.concatenate([getattr(one, f.name), getattr(other, f.name)])
+            for f in fields(_Candidates)
+        }
     )
-    if len(sound.start):
-        before = np.searchsorted(sound.start, doubtful.end, side="left") - 1
-        rival_end = np.where(before >= 0, sound.end[np.maximum(before, 0)], 0)
-        follows &= rival_end <= doubtful.start
-    chosen = doubtful[follows]
-    return chosen[_disjoint(chosen.start, chosen.end)]
+    return both[np.argsort(both.start, kind="stable")]
 
 
 def _disjoint(start: OffsetArray, end: OffsetArray) -> NDArray[np.intp] | slice:
