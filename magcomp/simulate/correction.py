@@ -78,7 +78,7 @@ class Correction:
 
 
 def motor_vectors(values: Mapping[str, float]) -> FloatArray:
-    """COMPASS_PMOT_1X … 4Z, shape (4, 3)."""
+    """COMPASS_PMOT1_X … COMPASS_PMOT4_Z, shape (4, 3)."""
     return np.array(
-        [[values[f"COMPASS_PMOT_{m}{axis}"] for axis in "XYZ"] for m in range(1, MOTORS + 1)]
+        [[values[f"COMPASS_PMOT{m}_{axis}"] for axis in "XYZ"] for m in range(1, MOTORS + 1)]
     )

@@ -23,7 +23,7 @@ DEVICE_IDS = (97539, 131874, 263178)
 """Identities of the three physical compasses."""
 
 _PER_MOTOR_SWITCH = "COMPASS_PMOT_EN"
-_PER_MOTOR = ("COMPASS_PMOT_EXP", *(f"COMPASS_PMOT_{m}{a}" for m in "1234" for a in "XYZ"))
+_PER_MOTOR = ("COMPASS_PMOT_EXP", *(f"COMPASS_PMOT{m}_{a}" for m in "1234" for a in "XYZ"))
 _READ_ONLY_FAMILIES = ("COMPASS_DEV_ID", "STAT_")
 _WRITABLE_STATISTIC = "STAT_RESET"
 # ArduPilot adds this before it cuts a float to a whole number.

@@ -116,8 +116,39 @@ class TestParameters:
         before = {v.param_id for v in ground.ask(request_list(), "PARAM_VALUE", 2.0)}
         ground.set("COMPASS_PMOT_EN", 1)
         after = {v.param_id for v in ground.ask(request_list(), "PARAM_VALUE", 2.0)}
-        hidden = {"COMPASS_PMOT_EXP"} | {f"COMPASS_PMOT_{m}{a}" for m in "1234" for a in "XYZ"}
+        hidden = {"COMPASS_PMOT_EXP"} | {f"COMPASS_PMOT{m}_{a}" for m in "1234" for a in "XYZ"}
         assert after - before == hidden
+
+    def test_per_motor_compensation_acts_on_the_first_compass_alone(self, on_ground):
+        ground = on_ground()
+        ground.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1)
+        before = self.fields(ground)
+        for name, value in (("PMOT_EXP", 1.0), ("PMOT_EN", 1.0), ("PMOT3_Z", 20.0)):
+            ground.set(f"COMPASS_{name}", value)
+        shift = self.fields(ground) - before
+        # An armed motor without demand turns at MOT_SPIN_ARM: a tenth of the battery's 25 V.
+        np.testing.assert_allclose(shift[0], [0, 0, 20.0 * 2.5], atol=6)
+        np.testing.assert_allclose(shift[1:], 0.0, atol=6)
+
+    @staticmethod
+    def fields(ground):
+        """Corrected fields of the three compasses, mGauss, shape (3, 3)."""
+        kinds = {"RAW_IMU": 27, "SCALED_IMU2": 116, "SCALED_IMU3": 129}
+        rows = []
+        for kind, number in kinds.items():
+            said = ground.command(mavlink.MAV_CMD_REQUEST_MESSAGE, number)
+            rows += [(m.xmag, m.ymag, m.zmag) for m in said if m.get_type() == kind]
+        return np.array(rows, dtype=float)
+
+    @pytest.mark.parametrize("name", ["COMPASS_OFS_Z", "COMPASS_MOT_Z"])
+    def test_a_compass_parameter_acts_at_once(self, on_ground, name):
+        ground = on_ground()
+        ground.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1)
+        ground.set("COMPASS_MOTCT", 2)
+        before = self.fields(ground)
+        ground.set(name, ground.machine.parameters[name] + 40.0)
+        shift = (self.fields(ground) - before)[0]
+        assert shift[2] > 25.0
 
     def test_all_three_compasses_are_complete(self, on_ground):
         names = {v.param_id for v in on_ground().ask(request_list(), "PARAM_VALUE", 2.0)}

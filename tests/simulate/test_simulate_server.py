@@ -53,15 +53,15 @@ def ground(request):
     kind = request.param
     with contextlib.ExitStack() as stack:
         if kind == "pty":
-            where = stack.enter_context(served("pty"))
+            where = stack.enter_context(served("pty", speed=10.0))
             link = mavutil.mavlink_connection(where, source_system=255)
         elif kind in ("udpout", "tcp"):
             port = free_port(socket.SOCK_DGRAM if kind == "udpout" else socket.SOCK_STREAM)
             listening = {"udpout": "udpin", "tcp": "tcpin"}[kind]
             link = mavutil.mavlink_connection(f"{listening}:127.0.0.1:{port}", source_system=255)
-            stack.enter_context(served(f"{kind}:127.0.0.1:{port}"))
+            stack.enter_context(served(f"{kind}:127.0.0.1:{port}", speed=10.0))
         else:
-            where = stack.enter_context(served(f"{kind}:127.0.0.1:0"))
+            where = stack.enter_context(served(f"{kind}:127.0.0.1:0", speed=10.0))
             link = mavutil.mavlink_connection(where, source_system=255)
         stack.callback(link.close)
         link.mav.heartbeat_send(6, 8, 0, 0, 0)
@@ -113,7 +113,7 @@ def test_with_speed_its_clock_runs_faster():
 
 
 def test_a_second_ground_station_takes_over_a_tcp_vehicle():
-    with served("tcpin:127.0.0.1:0") as where:
+    with served("tcpin:127.0.0.1:0", speed=10.0) as where:
         first = mavutil.mavlink_connection(where, source_system=255)
         assert first.recv_match(type="HEARTBEAT", blocking=True, timeout=WITHIN_S)
         first.close()
