@@ -42,6 +42,8 @@ _LEADING = (
 _FOLLOWING = (Message.RAW_IMU, Message.SERVO_OUTPUT_RAW, Message.GLOBAL_POSITION_INT)
 _MICROSECONDS = (Message.RAW_IMU, Message.SERVO_OUTPUT_RAW)
 
+_LATEST_STAMP = 1 << 53
+
 # A recorder whose clock says that it is earlier than 2001 does not know the date.
 _EARLIEST_UNIX_S = 1.0e9
 
@@ -130,12 +132,13 @@ def decode_vehicle(
     frames = found.frames[mine]
     rows = _rows(frames)
     tables = {message: decode(octets, frames[rows[message]], message) for message in rows}
-    copies = repeated(frames, _stamps(len(frames), rows, tables))
+    stamp = _stamps(len(frames), rows, tables)
+    copies = repeated(frames, stamp)
     if copies.any():
         tables = {message: tables[message][~copies[rows[message]]] for message in rows}
-        frames = frames[~copies]
+        frames, stamp = frames[~copies], stamp[~copies]
         rows = _rows(frames)
-    axis = _axis(frames, rows, tables)
+    axis = _axis(frames, stamp, rows)
     core = np.ones(len(frames), dtype=bool)
     for message in rows.keys() - WANTED:
         core[rows[message]] = False
@@ -190,37 +193,32 @@ def _rows(frames: Frames) -> dict[int, NDArray[np.intp]]:
     return {int(m): np.flatnonzero(frames.message == m) for m in present}
 
 
-def _stamp_of(message: int, table: Table) -> OffsetArray:
-    """The vehicle's time of each row in microseconds, shape (n,)."""
-    if message in _MICROSECONDS:
-        return table["time_usec"].astype(np.int64)
-    return table["time_boot_ms"].astype(np.int64) * 1000
+def _stamp(message: int, table: Table) -> OffsetArray:
+    """The vehicle's time of each row in microseconds, or ``NO_STAMP``, shape (n,)."""
+    micro = message in _MICROSECONDS
+    sent = table["time_usec"] if micro else table["time_boot_ms"].astype(np.uint64) * 1000
+    # No clock has run for three centuries.
+    return np.where(sent < _LATEST_STAMP, sent, NO_STAMP).astype(np.int64)
 
 
 def _stamps(n: int, rows: dict[int, NDArray[np.intp]], tables: dict[int, Table]) -> OffsetArray:
-    """The vehicle's time of each frame, or ``NO_STAMP``, shape (n,). A clock at 0 says nothing."""
+    """The vehicle's time of each frame in microseconds, or ``NO_STAMP``, shape (n,)."""
     result = np.full(n, NO_STAMP, dtype=np.int64)
     for message in rows.keys() & {*_LEADING, *_FOLLOWING}:
-        stamp = _stamp_of(message, tables[message])
-        result[rows[message]] = np.where(stamp > 0, stamp, NO_STAMP)
+        result[rows[message]] = _stamp(message, tables[message])
     return result
 
 
-def _axis(
-    frames: Frames, rows: dict[int, NDArray[np.intp]], tables: dict[int, Table]
-) -> FloatArray:
+def _axis(frames: Frames, stamp: OffsetArray, rows: dict[int, NDArray[np.intp]]) -> FloatArray:
     """Time of each frame in seconds from an arbitrary zero, shape (n,)."""
-    groups = [
-        Stamps(
-            rows[m],
-            _stamp_of(m, tables[m]),
-            MICROSECOND_WRAP if m in _MICROSECONDS else MILLISECOND_WRAP,
-            at_sending=m != Message.GLOBAL_POSITION_INT,
-        )
-        for m in (*_LEADING, *_FOLLOWING)
-        if m in rows
-    ]
-    leading = sum(m in rows for m in _LEADING)
+    groups = []
+    for message in (*_LEADING, *_FOLLOWING):
+        if message in rows:
+            stamped = rows[message][stamp[rows[message]] != NO_STAMP]
+            wrap = MICROSECOND_WRAP if message in _MICROSECONDS else MILLISECOND_WRAP
+            at_sending = message != Message.GLOBAL_POSITION_INT
+            groups.append(Stamps(stamped, stamp[stamped], wrap, at_sending))
+    leading = sum(message in rows for message in _LEADING)
     return time_axis(frames.arrival, frames.payload, groups[:leading], groups[leading:])
 
 

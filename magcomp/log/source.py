@@ -25,20 +25,22 @@ def mapped(path: str | Path) -> Iterator[ByteArray]:
     LogError
         There is no such file, it is not a regular file, or it cannot be read.
     """
-    location = Path(path)
+    content = _map(Path(path))
+    # Arrays still refer to the mapping when a caller's error is on its way; it closes with them.
+    yield np.frombuffer(content, dtype=np.uint8)
+
+
+def _map(path: Path) -> mmap.mmap | bytes:
     try:
-        kind = location.stat().st_mode
-        if not stat.S_ISREG(kind):
-            what = "a directory" if stat.S_ISDIR(kind) else "something that is no file"
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode):
+            what = "a directory" if stat.S_ISDIR(status.st_mode) else "something that is no file"
             raise LogError(f"Log {path} must be a file; instead received {what}.")
-        if not location.stat().st_size:
-            yield np.zeros(0, dtype=np.uint8)
-            return
-        with location.open("rb") as file:
-            content = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+        if not status.st_size:
+            return b""
+        with path.open("rb") as file:
+            return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
     except FileNotFoundError:
         raise LogError(f"Log {path} must exist; instead found no such file.") from None
     except (OSError, ValueError) as error:
         raise LogError(f"Log {path} must be readable; instead received: {error}.") from error
-    # Arrays still refer to the mapping when a caller's error is on its way; it closes with them.
-    yield np.frombuffer(content, dtype=np.uint8)

@@ -159,6 +159,26 @@ def test_where_the_vehicles_clock_stands_still_the_recorders_is_used(stamp: int)
     assert attitude(recording).time == pytest.approx(0.2 * np.arange(1, 51))
 
 
+def test_a_message_whose_clock_is_not_set_does_not_look_like_reboots() -> None:
+    sender = Sender()
+    frames = [sender.heartbeat()]
+    for n in range(50):
+        frames += [sender.scaled_imu(5000 + 100 * n), sender.attitude(0)]
+    recording = read(log(frames, lambda n: n * 70_000))
+    assert np.diff(recording.field[2].time) == pytest.approx(0.1)
+    assert recording.duration_s == pytest.approx(5.0, abs=0.1)
+
+
+def test_a_time_beyond_all_clocks_is_not_believed() -> None:
+    sender = Sender()
+    frames = [sender.heartbeat()]
+    for n in range(50):
+        frames += [sender.attitude(5000 + 100 * n), sender.raw_imu(2**64 - 1 - n)]
+    recording = read(log(frames, lambda n: n * 50_000))
+    assert recording.duration_s == pytest.approx(5.0, abs=0.1)
+    assert np.diff(recording.field[1].time) == pytest.approx(0.1)
+
+
 def test_the_recorders_clock_alone_stops_where_it_goes_back() -> None:
     sender = Sender()
     frames = [sender.heartbeat(), *(sender.throttle(n) for n in range(10))]
@@ -230,7 +250,7 @@ def test_an_old_position_does_not_draw_its_neighbours_back() -> None:
     st.lists(
         st.tuples(
             st.sampled_from(["attitude", "raw", "servos", "throttle", "heartbeat"]),
-            st.integers(0, 2**32 - 1),
+            st.integers(0, 2**32 - 1) | st.integers(0, 2**64 - 1),
             st.integers(-(2**40), 2**40),
         ),
         max_size=30,
@@ -241,9 +261,9 @@ def test_whatever_the_clocks_say_the_series_are_in_order(
 ) -> None:
     sender = Sender()
     send = {
-        "attitude": sender.attitude,
+        "attitude": lambda t: sender.attitude(t % 2**32),
         "raw": sender.raw_imu,
-        "servos": sender.servos,
+        "servos": lambda t: sender.servos(t % 2**32),
         "throttle": lambda t: sender.throttle(t % 101),
         "heartbeat": lambda _: sender.heartbeat(),
     }
