@@ -208,7 +208,7 @@ class Buffer:
         return True
 
     def _thin(self, block: _Block) -> None:
-        seconds = max(block.end_us - block.begin_us, 1) * 1e-6
+        seconds = max((block.end_us - block.begin_us) * 1e-6, 1.0)
         counts = Counter(_stream(record) for record in _records(block.records))
         fast = {stream for stream, count in counts.items() if count > _FASTEST_HZ * seconds}
         fast = {stream for stream in fast if stream[2] not in _PINNED}
