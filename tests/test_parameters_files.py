@@ -44,6 +44,7 @@ vehicles = st.builds(
     system=st.integers(1, 255),
     component=st.integers(1, 255),
     firmware=st.text(max_size=10),
+    board=st.text(max_size=10),
     device_ids=st.lists(st.integers(1, 2**24), max_size=3).map(tuple),
 )
 parameter_sets = st.builds(
@@ -75,7 +76,8 @@ def test_mission_planner_form_is_name_comma_value() -> None:
         "# magcomp 0.1.0, from flight.tlog",
         "# verdict: good",
         '# magcomp-vehicle: {"autopilot": "ardupilot", "kind": "copter", "system": 1, '
-        '"component": 1, "firmware": "4.6.3", "device_ids": [97539, 131874, 263178]}',
+        '"component": 1, "firmware": "4.6.3", "device_ids": [97539, 131874, 263178], '
+        '"board": ""}',
         "COMPASS_MOTCT,2",
         "COMPASS_MOT_X,-1.83",
         "COMPASS_MOT_Y,0",

@@ -347,9 +347,10 @@ def _parse_vehicle(text: str, where: str) -> Vehicle:
             system=_typed(found["system"], int),
             component=_typed(found["component"], int),
             firmware=_typed(found["firmware"], str),
+            board=_typed(found.get("board", ""), str),
             device_ids=tuple(_typed(device, int) for device in _typed(found["device_ids"], list)),
         )
-    except (ValueError, KeyError, TypeError, RecursionError) as error:
+    except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
         raise ParameterFileError(
             f"{where}: the vehicle must be as magcomp wrote it; instead received {_shown(text)}"
         ) from error

@@ -151,7 +151,7 @@ def read_journal(path: str | Path) -> JournalState:
         raise ParameterFileError(
             f"{path} must be a readable journal; instead received: {error.strerror}"
         ) from error
-    except (ValueError, KeyError, TypeError, RecursionError) as error:
+    except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
         raise ParameterFileError(
             f"{path} must be a journal that magcomp wrote; instead a line of it is not"
         ) from error

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from magcomp.errors import ParameterFileError, VehicleRefusedError, WriteError
 from magcomp.model import ParameterSet, Vehicle
@@ -210,15 +210,7 @@ def _devices(values: Mapping[str, float]) -> tuple[int, ...]:
 
 
 def _with_devices(vehicle: Vehicle, identity: Mapping[str, float]) -> Vehicle:
-    devices = _devices(identity)
-    return Vehicle(
-        vehicle.autopilot,
-        vehicle.kind,
-        vehicle.system,
-        vehicle.component,
-        vehicle.firmware,
-        devices or vehicle.device_ids,
-    )
+    return replace(vehicle, device_ids=_devices(identity) or vehicle.device_ids)
 
 
 def _check_identity(wanted: ParameterSet, actual: Vehicle, *, any_vehicle: bool) -> tuple[str, ...]:

@@ -428,3 +428,29 @@ def test_not_even_with_a_vehicle_that_answers_now_and_then(
             if not driver.sequence.finished:
                 driver.sequence.handle(ParamValue(sent.name, held[sent.name]), driver.now)
         driver.step(Heartbeat(False), wait)
+
+
+def test_backup_and_intention_are_on_the_disk_before_the_first_write(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    steps: list[str] = []
+    names: dict[int, str] = {}
+
+    def sync(descriptor: int) -> None:
+        names[descriptor] = Path(f"/dev/fd/{descriptor}").resolve().name
+        steps.append(names[descriptor])
+
+    send = rig.link.send
+
+    def watched(message: Any) -> None:
+        steps.append(message.get_type())
+        send(message)
+
+    monkeypatch.setattr("os.fsync", sync)
+    rig.link.send = watched
+    assert rig.write().good
+    before = steps[: steps.index("PARAM_SET")]
+    assert before[0].startswith(".backup.param")
+    assert before.count("backup.journal") == 2
+    assert before[-1] == "backup.journal"
+    assert steps.index("PARAM_REQUEST_READ") > before.index("backup.journal")
