@@ -9,7 +9,7 @@ import numpy as np
 
 from magcomp.align import controls, readings, reported
 from magcomp.earth import EarthField, expected_field
-from magcomp.errors import FitRejectedError, MissingDataError, UsageError
+from magcomp.errors import MissingDataError, UsageError
 from magcomp.fit import METHODS, Problem, best_form, fit
 from magcomp.geometry import gravity_direction
 from magcomp.judge import judge, judge_present
@@ -102,10 +102,10 @@ def analyse(
         Where a compass parameter in the recording is not finite.
     """
     wanted = Options() if options is None else options
-    found = _controls_of(recording, wanted)
+    found = _controls_of(recording)
+    kinds = _kinds(recording, found, wanted)
     earth, notes = _earth(recording)
     compasses = _compasses(recording, wanted)
-    kinds = list(dict.fromkeys(control.kind for control in found))
     steps = len(kinds) * len(compasses)
     judged: dict[str, list[_Judged]] = {}
     for kind in kinds:
@@ -146,7 +146,7 @@ def check(recording: Recording, options: Options | None = None) -> Mapping[int, 
         As :func:`analyse`.
     """
     wanted = Options() if options is None else options
-    found = _controls_of(recording, wanted)
+    found = _controls_of(recording)
     earth, _ = _earth(recording)
     by_kind = reported(found)
     verdicts = {}
@@ -183,32 +183,51 @@ def _one(
     return _Judged(problem, found, verdict)
 
 
-def _controls_of(recording: Recording, wanted: Options) -> tuple[Control, ...]:
+def _controls_of(recording: Recording) -> tuple[Control, ...]:
     found = controls(recording)
     if not found:
         raise MissingDataError(
             f"{recording.source} must hold a battery current or a throttle that changes; instead "
             "it holds neither: was the vehicle ever armed?"
         )
+    return found
+
+
+def _kinds(recording: Recording, found: Iterable[Control], wanted: Options) -> list[str]:
+    """The control quantities to try, the reported ones first."""
+    kinds = list(dict.fromkeys(control.kind for control in found))
     if wanted.regressor == "auto":
-        return found
-    kept = tuple(control for control in found if control.kind == wanted.regressor)
-    if not kept:
+        return kinds
+    if wanted.regressor not in kinds:
         raise MissingDataError(
             f"{recording.source} must hold a {wanted.regressor} that changes; instead it holds "
-            f"only {', '.join(sorted({c.kind for c in found}))}"
+            f"only {', '.join(kinds)}"
         )
-    # The others stay at hand for undoing a correction that was in force.
-    return kept + tuple(c for c in found if c.kind not in {k.kind for k in kept})[:0]
+    return [wanted.regressor]
 
 
 def _compasses(recording: Recording, wanted: Options) -> list[int]:
+    """The compasses to fit; the first cannot be while it is corrected per motor.
+
+    Notes
+    -----
+    COMPASS_PMOT_EN overrides COMPASS_MOTCT for compass 1 (AUTOPILOTS.md).
+    """
     if not recording.field:
         raise MissingDataError(
             f"{recording.source} must hold readings of a compass (RAW_IMU, SCALED_IMU2 or "
             "SCALED_IMU3); instead it holds none"
         )
-    return sorted(recording.field) if wanted.compass is None else [wanted.compass]
+    asked = sorted(recording.field) if wanted.compass is None else [wanted.compass]
+    if not recording.parameters.last("COMPASS_PMOT_EN", 0.0):
+        return asked
+    left = [compass for compass in asked if compass != 1]
+    if not left:
+        raise MissingDataError(
+            "COMPASS_PMOT_EN must be 0 while compass 1 is recorded; instead it is on, and a "
+            "correction per motor cannot be undone from a log"
+        )
+    return left
 
 
 def _earth(recording: Recording) -> tuple[EarthField, list[str]]:
@@ -260,6 +279,8 @@ def _notes(recording: Recording, judged: Mapping[str, list[_Judged]], chosen: st
             f"the vehicle is a {recording.vehicle.kind}: magcomp is made for multirotors, whose "
             "thrust demand is the throttle the autopilot multiplies"
         )
+    if recording.parameters.last("COMPASS_PMOT_EN", 0.0):
+        yield "compass 1 is left out: COMPASS_PMOT_EN is on, so it is corrected per motor"
     if not recording.parameters.names:
         yield (
             "the log holds no parameters: the calibration in force is unknown, so only the motor "
@@ -271,9 +292,3 @@ def _notes(recording: Recording, judged: Mapping[str, list[_Judged]], chosen: st
         yield f"messages of other systems were left out ({named})"
     if recording.report.bad_checksum:
         yield f"{recording.report.bad_checksum} damaged messages were left out"
-
-
-def rejected(result: Analysis) -> FitRejectedError:
-    """The error that says why nothing of an analysis should be written."""
-    first = result.compasses[0].verdict.reasons[0]
-    return FitRejectedError(f"No compass has a fit to be trusted: {first}.")
