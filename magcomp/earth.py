@@ -14,6 +14,8 @@ _MGAUSS_PER_NANOTESLA = 0.01
 _FIRST_MODEL_YEAR = 2010.0
 _MODEL_SPAN_YEARS = 5.0
 _LAST_MODEL_YEAR = 2030.0
+_FIRST_MODEL_UNIX_S = 1_262_304_000.0
+_LAST_MODEL_UNIX_S = 1_893_456_000.0
 
 
 @dataclass(frozen=True)
@@ -73,13 +75,15 @@ def expected_field(
     Raises
     ------
     InputError
-        For a position that is not on the earth.
+        For a position that is not on the earth, or an altitude that is not a number.
     """
     if not (abs(latitude_deg) <= 90.0 and abs(longitude_deg) <= 360.0):
         raise InputError(
             "A position must be a latitude within ±90° and a longitude within ±180°; "
             f"instead received {latitude_deg}, {longitude_deg}"
         )
+    if not np.isfinite(altitude_m):
+        raise InputError(f"An altitude must be a number of metres; instead received {altitude_m}")
     # Imported here because the model's tables cost more than the rest of `import magcomp`.
     from pygeomag import GeoMag  # noqa: PLC0415
 
@@ -105,7 +109,9 @@ def expected_field(
 def _decimal_year(unix_s: float) -> float:
     if not np.isfinite(unix_s):
         return _LAST_MODEL_YEAR - _MODEL_SPAN_YEARS
-    moment = datetime.datetime.fromtimestamp(unix_s, datetime.UTC)
+    # A log's 64-bit clock can say years that no calendar holds; the models' years are enough.
+    within = min(max(unix_s, _FIRST_MODEL_UNIX_S), _LAST_MODEL_UNIX_S)
+    moment = datetime.datetime.fromtimestamp(within, datetime.UTC)
     start = datetime.datetime(moment.year, 1, 1, tzinfo=datetime.UTC)
     end = datetime.datetime(moment.year + 1, 1, 1, tzinfo=datetime.UTC)
     return moment.year + (moment - start) / (end - start)
