@@ -197,8 +197,9 @@ def _stamp(message: int, table: Table) -> OffsetArray:
     """The vehicle's time of each row in microseconds, or ``NO_STAMP``, shape (n,)."""
     micro = message in _MICROSECONDS
     sent = table["time_usec"] if micro else table["time_boot_ms"].astype(np.uint64) * 1000
-    # No clock has run for three centuries.
-    return np.where(sent < _LATEST_STAMP, sent, NO_STAMP).astype(np.int64)
+    # No clock has run for three centuries, and one that is always 0 has not been set.
+    believed = (sent < _LATEST_STAMP) & sent.any()
+    return np.where(believed, sent.astype(np.int64), NO_STAMP)
 
 
 def _stamps(n: int, rows: dict[int, NDArray[np.intp]], tables: dict[int, Table]) -> OffsetArray:

@@ -27,7 +27,7 @@ from magcomp.model import FloatArray
 SECOND = 1_000_000
 MILLISECOND_WRAP = (1 << 32) * 1000
 MICROSECOND_WRAP = 1 << 32
-NO_STAMP = 0  # A clock at 0 has not been set.
+NO_STAMP = -1
 
 # Messages are stamped a little before they are sent, so neighbours may stand in the wrong order.
 _DISORDER = SECOND
