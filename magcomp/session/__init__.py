@@ -1,6 +1,6 @@
 """Collect → fit → judge → write, without a user interface."""
 
-from magcomp.session.analyse import Options, analyse, check
+from magcomp.session.analyse import Options, analyse, check, regressor_in_force
 from magcomp.session.emit import parameter_set
 
-__all__ = ["Options", "analyse", "check", "parameter_set"]
+__all__ = ["Options", "analyse", "check", "parameter_set", "regressor_in_force"]

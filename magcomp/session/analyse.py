@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from magcomp.align import controls, readings, reported
+from magcomp.autopilot import ardupilot
 from magcomp.earth import EarthField, expected_field
 from magcomp.errors import MissingDataError, UsageError
 from magcomp.fit import METHODS, Problem, best_form, fit
@@ -160,6 +161,19 @@ def check(recording: Recording, options: Options | None = None) -> Mapping[int, 
             )
         verdicts[compass] = judge_present(Problem(new, by_kind[kind], by_kind, earth))
     return verdicts
+
+
+def regressor_in_force(recording: Recording) -> str:
+    """The control quantity that :func:`check` judges a recording by.
+
+    Raises
+    ------
+    MissingDataError
+        Where the recording holds no control quantity.
+    """
+    switch = recording.parameters.last(ardupilot.COMPENSATION_SWITCH, 0.0)
+    named = (kind for kind, value in ardupilot.COMPENSATION_OF.items() if value == switch)
+    return next(named, "") or _controls_of(recording)[0].kind
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,131 @@
+"""The command group, and what becomes of every error.
+
+A command is a module of its own with a click command named as in `COMMANDS`; it is imported
+when it is called. Adding one is one line in that table.
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+import sys
+import traceback
+from typing import NamedTuple, NoReturn
+
+import click
+
+from magcomp import __version__
+from magcomp.cli.output import complain
+from magcomp.errors import ExitCode, MagcompError
+
+
+class _Command(NamedTuple):
+    module: str
+    summary: str
+
+
+COMMANDS = {
+    "fit": _Command("magcomp.cli.fit", "Find the compensation in a log, judge it, write it."),
+    "check": _Command("magcomp.cli.check", "Judge the calibration in force; fit nothing."),
+    "demo": _Command("magcomp.cli.demo", "Fit a recorded flight whose truth is known."),
+}
+
+
+class LazyGroup(click.Group):
+    """A group that imports a command's module when the command is called."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
+        """Names of all commands, in the order of the table."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
+        """Import and return one command."""
+        if cmd_name not in COMMANDS:
+            return None
+        command = getattr(importlib.import_module(COMMANDS[cmd_name].module), cmd_name)
+        if not isinstance(command, click.Command):
+            raise TypeError(f"{COMMANDS[cmd_name].module}.{cmd_name} must be a click command")
+        return command
+
+    def format_commands(
+        self,
+        ctx: click.Context,  # noqa: ARG002
+        formatter: click.HelpFormatter,
+    ) -> None:
+        """List the commands without importing them."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, command.summary) for name, command in COMMANDS.items()])
+
+
+@click.group(
+    cls=LazyGroup,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+    epilog="Exit codes: 0 good, 1 fit rejected, 2 usage or unreadable input, 3 link, 4 timeout, "
+    "5 write or read-back mismatch, 130 interrupted.",
+)
+@click.version_option(__version__, prog_name="magcomp")
+@click.option("--debug", is_flag=True, help="Show the traceback of an unexpected error.")
+def app(debug: bool) -> None:
+    """Find how a multirotor's motors shift its compass, and what cancels the shift.
+
+    \b
+    Start with:  magcomp fit flight.tlog
+    """  # noqa: D301 - \b tells click to keep the line
+
+
+def main(arguments: list[str] | None = None) -> NoReturn:
+    """Run the command line and end the process with one of `ExitCode`.
+
+    Parameters
+    ----------
+    arguments
+        Without the program's name; those of the process by default.
+    """
+    arguments = sys.argv[1:] if arguments is None else arguments
+    sys.exit(run(arguments))
+
+
+def run(arguments: list[str]) -> int:
+    """Run the command line and return the exit code; every error becomes one sentence."""
+    try:
+        code = app.main(arguments, prog_name="magcomp", standalone_mode=False)
+    except (click.Abort, KeyboardInterrupt):
+        complain("interrupted")
+        return ExitCode.INTERRUPTED
+    except Exception as error:
+        sentence, code, foreseen = _explain(error)
+        complain(sentence)
+        if not foreseen and ("--debug" in arguments or os.environ.get("MAGCOMP_DEBUG")):
+            traceback.print_exception(error)
+        return code
+    return code if isinstance(code, int) else ExitCode.GOOD
+
+
+def _explain(error: Exception) -> tuple[str, ExitCode, bool]:
+    """A sentence, an exit code, and whether this error is one that users make happen."""
+    match error:
+        case MagcompError():
+            return str(error), error.exit_code, True
+        case click.exceptions.NoArgsIsHelpError():
+            return "a command must be given. Try 'magcomp --help'", ExitCode.USAGE, True
+        case click.ClickException():
+            context = getattr(error, "ctx", None)
+            hint = f". Try '{context.command_path} --help'" if context is not None else ""
+            return error.format_message().rstrip(".?") + hint, ExitCode.USAGE, True
+        case OSError() | UnicodeError():
+            return _sentence(error), ExitCode.USAGE, False
+        case MemoryError():
+            return "the work must fit in memory; instead there is none left", ExitCode.USAGE, False
+    return (
+        f"this should not have happened: {type(error).__name__}: {error}. Please report it with "
+        "what --debug before the command shows",
+        ExitCode.USAGE,
+        False,
+    )
+
+
+def _sentence(error: OSError | UnicodeError) -> str:
+    if isinstance(error, UnicodeError):
+        return f"a name must be text in the system's encoding; instead received: {error}"
+    what = error.strerror or str(error)
+    return f"{error.filename}: {what}" if error.filename is not None else what

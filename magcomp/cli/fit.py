@@ -1,0 +1,106 @@
+"""``magcomp fit``: from a log to a parameter file."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import click
+
+from magcomp.cli.options import (
+    Selection,
+    check_output,
+    json_option,
+    log_argument,
+    selection_options,
+    verbose_option,
+)
+from magcomp.cli.output import answer, complain, look
+from magcomp.cli.work import fit_log
+from magcomp.errors import ExitCode
+from magcomp.fit import METHODS
+from magcomp.model import Analysis, Grade
+from magcomp.parameters.files import SUFFIXES, write_parameter_file
+from magcomp.report import as_json
+from magcomp.session import Options, parameter_set
+from magcomp.session.analyse import REGRESSORS
+
+
+@click.command("fit")
+@log_argument
+@click.option(
+    "--method",
+    type=click.Choice(METHODS),
+    default="auto",
+    show_default=True,
+    help="How: standing still, turned at steady levels, or flown.",
+)
+@click.option(
+    "--regressor",
+    type=click.Choice(REGRESSORS),
+    default="auto",
+    show_default=True,
+    help="What the autopilot is to multiply the correction by.",
+)
+@selection_options
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help=f"Write the parameters; the suffix chooses the form: {', '.join(SUFFIXES)}.",
+)
+@json_option
+@verbose_option
+@click.option(
+    "--force",
+    is_flag=True,
+    help="Overwrite FILE; also write a fit the judge rejects (still exit code 1).",
+)
+def fit(
+    log: Path,
+    method: str,
+    regressor: str,
+    selection: Selection,
+    output: Path | None,
+    to_json: bool,
+    verbose: bool,
+    force: bool,
+) -> ExitCode:
+    """Find in LOG how the motors shift the compass, and what cancels the shift.
+
+    The answer is judged on stretches of the log that the fit did not see. Nothing is written
+    without -o, and nothing that the judge rejects is written without --force.
+    """
+    options = Options(selection.compass, method, regressor, selection.start, selection.end)
+    if output is not None:
+        check_output(output, SUFFIXES, force=force)
+    recording, analysis = fit_log(log, options, selection.system)
+    written = _write(analysis, output, force=force)
+    if to_json:
+        answer(as_json.dumps(as_json.analysis_object(analysis, written)))
+    else:
+        # Rich is only worth its import where an answer is for people.
+        from magcomp.report import as_text  # noqa: PLC0415
+
+        history = recording.parameters
+        present = {name: history.last(name, math.nan) for name in history.names}
+        answer(as_text.analysis_text(analysis, present, look(), written=written, verbose=verbose))
+    if analysis.grade is not Grade.REJECTED:
+        return ExitCode.GOOD
+    if output is not None and written is None:
+        complain(
+            f"{output} is not written because no compass has a fit to be trusted; --force writes "
+            "it all the same"
+        )
+    return ExitCode.REJECTED
+
+
+def _write(analysis: Analysis, output: Path | None, *, force: bool) -> str | None:
+    """Write the parameter file that was asked for, and return its name if it was written."""
+    rejected = analysis.grade is Grade.REJECTED
+    if output is None or (rejected and not force):
+        return None
+    chosen = parameter_set(analysis, include_rejected=rejected)
+    write_parameter_file(output, chosen, force=force)
+    return str(output)

@@ -1,0 +1,90 @@
+"""Options that several commands share, and checks that come before long work."""
+
+from __future__ import annotations
+
+import functools
+import math
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+import click
+
+from magcomp.errors import OutputError, UsageError
+
+_Result = TypeVar("_Result")
+
+log_argument = click.argument("log", type=click.Path(path_type=Path))
+json_option = click.option("--json", "to_json", is_flag=True, help="Print one JSON object.")
+verbose_option = click.option("-v", "--verbose", is_flag=True, help="Show every detail.")
+
+
+@dataclass(frozen=True)
+class Selection:
+    """Which part of a log to use.
+
+    Attributes
+    ----------
+    compass
+        One compass, or None for all.
+    start, end
+        Seconds since the recording began.
+    system
+        MAVLink system of the vehicle; None where the log holds only one.
+    """
+
+    compass: int | None
+    start: float
+    end: float
+    system: int | None
+
+
+def selection_options(command: Callable[..., _Result]) -> Callable[..., _Result]:
+    """Give a command --compass, --start, --end and --system as one `Selection`."""
+
+    @click.option("--compass", type=click.IntRange(1, 3), help="One compass; all by default.")
+    @click.option(
+        "--start", type=float, default=-math.inf, metavar="S", help="Leave out what is before, s."
+    )
+    @click.option(
+        "--end", type=float, default=math.inf, metavar="S", help="Leave out what is after, s."
+    )
+    @click.option("--system", type=click.IntRange(1, 255), help="MAVLink system of the vehicle.")
+    @functools.wraps(command)
+    def with_selection(
+        compass: int | None, start: float, end: float, system: int | None, **others: object
+    ) -> _Result:
+        return command(selection=Selection(compass, start, end, system), **others)
+
+    return with_selection
+
+
+def check_output(path: Path, suffixes: Sequence[str], *, force: bool) -> None:
+    """Refuse an output that could not be written, before the work is done.
+
+    Raises
+    ------
+    UsageError
+        Where the suffix is none of ``suffixes``.
+    OutputError
+        Where the path is a directory, its directory is missing or read-only, or the file exists
+        and ``force`` is not set.
+    """
+    if path.suffix.lower() not in suffixes:
+        raise UsageError(
+            f"{path} must end in {' or '.join(suffixes)}; instead received "
+            f"{path.suffix or 'no suffix'}"
+        )
+    try:
+        if path.is_dir():
+            raise OutputError(f"{path} must be a file; instead it is a directory")
+        if path.exists() and not force:
+            raise OutputError(f"{path} must not exist yet; use --force to overwrite it")
+        if not path.parent.is_dir():
+            raise OutputError(f"{path.parent} must be a directory; instead there is none")
+    except (OSError, ValueError) as error:
+        raise OutputError(f"{path} must be a path to a file; instead received: {error}") from error
+    if not os.access(path.parent, os.W_OK):
+        raise OutputError(f"{path.parent} must be writable; instead it is read-only")

@@ -1,0 +1,38 @@
+"""What commands do with a log, with progress."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from magcomp.cli.output import progress
+from magcomp.log import read
+from magcomp.model import Analysis, Recording, Verdict
+from magcomp.session import Options, analyse, check
+
+_READING = 0.1
+"""Share of the progress bar that reading the log takes."""
+
+
+def fit_log(log: Path, options: Options, system: int | None) -> tuple[Recording, Analysis]:
+    """Read a log, fit and judge it."""
+    with progress() as step:
+        recording = read(
+            log, system=system, progress=lambda share: step("reading the log", share * _READING)
+        )
+        analysis = analyse(
+            recording,
+            options,
+            lambda what, share: step(f"fitting {what}", _READING + share * (1.0 - _READING)),
+        )
+    return recording, analysis
+
+
+def check_log(
+    log: Path, options: Options, system: int | None
+) -> tuple[Recording, Mapping[int, Verdict]]:
+    """Read a log and judge the calibration in force."""
+    with progress() as step:
+        recording = read(log, system=system, progress=lambda share: step("reading the log", share))
+        step("judging", 1.0)
+        return recording, check(recording, options)

@@ -1,0 +1,184 @@
+"""An analysis as one JSON object: the form that scripts rely on.
+
+Keys are added, never renamed. A number that does not exist is null; NaN and infinity never
+appear.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from magcomp import __version__
+from magcomp.model import (
+    UNITS,
+    Analysis,
+    CompassResult,
+    Coverage,
+    FieldResidual,
+    Lags,
+    Line,
+    Recording,
+    Vehicle,
+    Verdict,
+)
+
+
+def analysis_object(analysis: Analysis, written: str | None = None) -> dict[str, Any]:
+    """What ``magcomp fit --json`` prints.
+
+    Parameters
+    ----------
+    analysis
+        The answer.
+    written
+        The parameter file it went to, if any.
+    """
+    return {
+        **_head(analysis.source, analysis.duration_s, analysis.vehicle),
+        "verdict": analysis.grade.value,
+        "compasses": [_compass(result) for result in analysis.compasses],
+        "notes": list(analysis.notes),
+        "written": written,
+    }
+
+
+def check_object(
+    recording: Recording, verdicts: Mapping[int, Verdict], regressor: str
+) -> dict[str, Any]:
+    """What ``magcomp check --json`` prints."""
+    return {
+        **_head(recording.source, recording.duration_s, recording.vehicle),
+        "compasses": [
+            {
+                "compass": compass,
+                "regressor": regressor,
+                "unit": UNITS[regressor],
+                "heading_error_deg": [
+                    {"u": row.u, "in_force": row.before, "p95": row.p95}
+                    for row in verdict.heading_error
+                ],
+                "field_residual_mgauss": {"in_force": verdict.residual.before},
+                "coverage": _coverage(verdict.coverage),
+                "verdict": verdict.grade.value,
+                "reasons": list(verdict.reasons),
+            }
+            for compass, verdict in sorted(verdicts.items())
+        ],
+    }
+
+
+def dumps(document: Mapping[str, Any]) -> str:
+    """The object as text, ASCII only, with a line feed at its end."""
+    return json.dumps(_finite(document), indent=2, allow_nan=False) + "\n"
+
+
+def _head(source: str, duration_s: float, vehicle: Vehicle) -> dict[str, Any]:
+    return {
+        "magcomp": __version__,
+        "source": source,
+        "duration_s": round(duration_s, 3),
+        "vehicle": {
+            "autopilot": vehicle.autopilot,
+            "kind": vehicle.kind,
+            "system": vehicle.system,
+            "component": vehicle.component,
+            "firmware": vehicle.firmware,
+            "device_ids": list(vehicle.device_ids),
+        },
+    }
+
+
+def _compass(result: CompassResult) -> dict[str, Any]:
+    fit, verdict = result.fit, result.verdict
+    return {
+        "compass": fit.compass,
+        "method": fit.method,
+        "why": fit.why,
+        "regressor": fit.regressor,
+        "unit": UNITS[fit.regressor],
+        "origin": fit.origin,
+        "interference_mgauss": fit.interference,
+        "std_mgauss": fit.interference_std,
+        "lag_s": _lags(fit.lags),
+        "lag_std_s": _lags(fit.lags_std),
+        "line": None if fit.line is None else _line(fit.line),
+        "levels": [
+            {
+                "u": level.u,
+                "centre_mgauss": level.centre,
+                "std_mgauss": np.sqrt(np.diag(level.covariance)),
+                "count": level.count,
+            }
+            for level in fit.levels
+        ],
+        "field_residual_mgauss": _residual(verdict.residual),
+        "heading_error_deg": [
+            {"u": row.u, "before": row.before, "after": row.after, "p95": row.p95}
+            for row in verdict.heading_error
+        ],
+        "coverage": _coverage(verdict.coverage),
+        "free": sorted(fit.free),
+        "earth_mgauss": {"strength": fit.strength, "vertical": fit.vertical},
+        "noise_mgauss": fit.noise,
+        "count": fit.count,
+        "parameters": dict(result.parameters),
+        "verdict": verdict.grade.value,
+        "reasons": list(verdict.reasons),
+    }
+
+
+def _lags(lags: Lags) -> dict[str, float]:
+    return {"field": lags.field, "regressor": lags.regressor}
+
+
+def _line(line: Line) -> dict[str, Any]:
+    return {
+        "point_mgauss": line.point,
+        "direction": line.direction,
+        "straightness": line.straightness,
+        "rms_mgauss": line.rms,
+        "positions_mgauss": line.positions,
+        "slope_mgauss": line.slope,
+        "slope_std_mgauss": line.slope_std,
+    }
+
+
+def _residual(residual: FieldResidual) -> dict[str, float]:
+    return {
+        "before": residual.before,
+        "after": residual.after,
+        "held_out": residual.held_out,
+        "held_out_before": residual.held_out_before,
+    }
+
+
+def _coverage(coverage: Coverage) -> dict[str, float]:
+    return {
+        "sphere": coverage.sphere,
+        "heading": coverage.heading,
+        "tilt_deg": coverage.tilt_deg,
+        "u_low": coverage.u_low,
+        "u_high": coverage.u_high,
+        "seconds": coverage.seconds,
+    }
+
+
+def _finite(value: Any) -> Any:
+    """Plain Python values, with None for every number that is not finite."""
+    match value:
+        case dict():
+            return {key: _finite(item) for key, item in value.items()}
+        case list() | tuple():
+            return [_finite(item) for item in value]
+        case np.ndarray():
+            return _finite(value.tolist())
+        case np.generic():
+            return _finite(value.item())
+        case float():
+            return value if math.isfinite(value) else None
+    return value

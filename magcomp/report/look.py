@@ -1,0 +1,21 @@
+"""How text for people is laid out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Look:
+    """Where a text is going.
+
+    Attributes
+    ----------
+    columns
+        Width.
+    colour
+        Whether a terminal's colours may be used.
+    """
+
+    columns: int = 80
+    colour: bool = False

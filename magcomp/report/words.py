@@ -1,0 +1,91 @@
+"""Numbers and names as people read them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from datetime import UTC, datetime
+
+from magcomp.model import CURRENT, Vehicle
+
+_AUTOPILOTS = {"ardupilot": "ArduPilot", "px4": "PX4"}
+
+
+def quantity(u: float, regressor: str) -> str:
+    """A control quantity: ``20 A`` or ``40 %``."""
+    return f"{u:.0f} A" if regressor == CURRENT else f"{100 * u:.0f} %"
+
+
+def per_unit(regressor: str) -> str:
+    """Unit of an interference vector."""
+    return "mGauss per A" if regressor == CURRENT else "mGauss at full throttle"
+
+
+def with_std(value: float, std: float) -> str:
+    """A value to the two significant digits of its standard error: ``-1.126 ± 0.020``."""
+    if not math.isfinite(std) or std <= 0.0:
+        return number(value)
+    decimals = min(max(1 - math.floor(math.log10(std)), 0), 4)
+    return f"{value:.{decimals}f} ± {std:.{decimals}f}"
+
+
+def number(value: float) -> str:
+    """A parameter's value, to a precision no autopilot notices."""
+    if not math.isfinite(value):
+        return "?"
+    size = abs(value)
+    decimals = 1 if size >= 1000 else 2 if size >= 100 else 3
+    text = f"{value:.{decimals}f}"
+    text = text.rstrip("0").rstrip(".")
+    return "0" if text in ("", "-0") else text
+
+
+def milliseconds(value: float, std: float) -> str:
+    """A lag in seconds as milliseconds with its standard error; a dash where there is none."""
+    if not math.isfinite(value):
+        return "–"
+    if not math.isfinite(std):
+        return f"{1000 * value:.0f}"
+    return f"{1000 * value:.0f} ± {max(1000 * std, 1.0):.0f}"
+
+
+def duration(seconds: float) -> str:
+    """``58 s``, ``3 min 54 s`` or ``2 h 5 min``."""
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    minutes, rest = divmod(whole, 60)
+    if minutes < 60:
+        return f"{minutes} min {rest} s"
+    return f"{minutes // 60} h {minutes % 60} min"
+
+
+def date(unix_s: float) -> str:
+    """Day of a recording, UTC; empty where it is unknown or cannot be."""
+    try:
+        return datetime.fromtimestamp(unix_s, UTC).strftime("%Y-%m-%d")
+    except (OverflowError, OSError, ValueError):
+        return ""
+
+
+def listed(items: Sequence[object]) -> str:
+    """``1``, ``1 and 2``, ``1, 2 and 3``."""
+    words = [str(item) for item in items]
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+
+
+def compasses(numbers: Sequence[int]) -> str:
+    """``compass 1`` or ``compasses 1, 2 and 3``."""
+    return f"compass{'es' if len(numbers) > 1 else ''} {listed(numbers)}"
+
+
+def vehicle(of: Vehicle) -> str:
+    """``ArduPilot copter 4.6.3, system 1``."""
+    known = "" if of.kind == "unknown" else of.kind
+    words = [_AUTOPILOTS.get(of.autopilot, of.autopilot), known, of.firmware]
+    return f"{' '.join(filter(None, words))}, system {of.system}"
+
+
+def sentence(text: str) -> str:
+    """A reason with a capital letter and a full stop."""
+    return f"{text[:1].upper()}{text[1:]}".rstrip(".") + "."
