@@ -40,10 +40,20 @@ class Autopilot:
         The parameters.
     system, component
         MAVLink identity.
+    answers_errors
+        Answer with PARAM_ERROR where 4.6 is silent, as newer firmware does.
     """
 
-    def __init__(self, store: ParameterStore, system: int = 1, component: int = 1) -> None:
+    def __init__(
+        self,
+        store: ParameterStore,
+        system: int = 1,
+        component: int = 1,
+        *,
+        answers_errors: bool = False,
+    ) -> None:
         self.store = store
+        self._answers_errors = answers_errors
         self.system = system
         self.component = component
         self.mode = _MODES["stabilize"]
@@ -178,26 +188,41 @@ class Autopilot:
         self._list = deque(enumerate(self.store.listed))
 
     def _on_read(self, message: Any, now_ms: int) -> None:  # noqa: ARG002
-        if message.param_index == -1:
-            name = message.param_id
-            if name in self.store:
-                self._send_parameter(name, _NO_INDEX)
-            return
         listed = self.store.listed
-        if 0 <= message.param_index < len(listed):
+        if message.param_index == -1 and message.param_id in self.store:
+            self._send_parameter(message.param_id, _NO_INDEX)
+        elif 0 <= message.param_index < len(listed):
             self._send_parameter(listed[message.param_index], message.param_index)
+        else:
+            self._object(message, "DOES_NOT_EXIST")
 
     def _on_set(self, message: Any, now_ms: int) -> None:  # noqa: ARG002
         name, value = message.param_id, message.param_value
-        if name not in self.store or not np.isfinite(value):
-            return
-        if is_read_only(name):
+        if name not in self.store:
+            self._object(message, "DOES_NOT_EXIST")
+        elif not np.isfinite(value):
+            self._object(message, "VALUE_OUT_OF_RANGE")
+        elif is_read_only(name):
             self.say(f"Param write denied ({name})", mavlink.MAV_SEVERITY_WARNING)
+            self._object(message, "READ_ONLY")
             self._send_parameter(name, _NO_INDEX)
-            return
-        self.store.put(name, value)
-        for echoed in self.store.echoed(name):
-            self._send_parameter(echoed, _NO_INDEX)
+        else:
+            self.store.put(name, value)
+            for echoed in self.store.echoed(name):
+                self._send_parameter(echoed, _NO_INDEX)
+
+    def _object(self, message: Any, error: str) -> None:
+        """PARAM_ERROR, where the firmware has it."""
+        if self._answers_errors:
+            self.outgoing.append(
+                mavlink.MAVLink_param_error_message(
+                    target_system=message.get_srcSystem(),
+                    target_component=message.get_srcComponent(),
+                    param_id=message.param_id.encode("ascii", "replace"),
+                    param_index=getattr(message, "param_index", -1),
+                    error=getattr(mavlink, f"MAV_PARAM_ERROR_{error}"),
+                )
+            )
 
     def _on_data_stream(self, message: Any, now_ms: int) -> None:
         rate = message.req_message_rate if message.start_stop else 0

@@ -61,6 +61,8 @@ class Vehicle:
         Hold the programme until the first message from a ground station.
     signing_key
         32 bytes: sign every frame, and take none from the ground that is not signed with it.
+    answers_errors
+        Send PARAM_ERROR where 4.6 is silent, as newer firmware does.
     system
         MAVLink system number.
     """
@@ -73,6 +75,7 @@ class Vehicle:
         parameters: Mapping[str, float] | None = None,
         wait_for_ground: bool = False,
         signing_key: bytes | None = None,
+        answers_errors: bool = False,
         system: int = 1,
     ) -> None:
         self.truth = scenario.truth
@@ -81,7 +84,7 @@ class Vehicle:
         self._mode = scenario.mode
         self._start_unix_s = start_unix_s
         self._store = ParameterStore({**initial_values(scenario.truth), **(parameters or {})})
-        self._autopilot = Autopilot(self._store, system)
+        self._autopilot = Autopilot(self._store, system, answers_errors=answers_errors)
         self._correction = Correction(self._store)
         self._signing_key = signing_key
         self._tick = 0

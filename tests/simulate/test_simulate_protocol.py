@@ -111,6 +111,19 @@ class TestParameters:
         assert ground.ask(message, "PARAM_VALUE") == []
         assert ground.machine.parameters["COMPASS_MOT_X"] == 0.0
 
+    @pytest.mark.skipif(
+        not hasattr(mavlink, "MAVLink_param_error_message"), reason="pymavlink without PARAM_ERROR"
+    )
+    @pytest.mark.parametrize(
+        ("name", "value", "error"),
+        [("NO_SUCH_NAME", 1.0, 1), ("COMPASS_MOT_X", math.nan, 2), ("COMPASS_DEV_ID", 5.0, 5)],
+    )
+    def test_newer_firmware_says_what_is_wrong(self, on_ground, name, value, error):
+        ground = on_ground(answers_errors=True)
+        message = mavlink.MAVLink_param_set_message(1, 1, name.encode(), value, 9)
+        [answer] = ground.ask(message, "PARAM_ERROR")
+        assert (answer.param_id, answer.error) == (name, error)
+
     def test_per_motor_names_are_listed_only_when_switched_on(self, on_ground):
         ground = on_ground()
         before = {v.param_id for v in ground.ask(request_list(), "PARAM_VALUE", 2.0)}
@@ -312,6 +325,33 @@ class TestStreams:
         again = ground.command(mavlink.MAV_CMD_REQUEST_MESSAGE, RAW_IMU)
         [reading] = [m for m in again if m.get_type() == "RAW_IMU"]
         assert reading.time_usec < 2e6
+
+
+class TestSigning:
+    KEY = bytes(range(32))
+
+    def test_every_frame_is_signed(self, on_ground):
+        vehicle = on_ground(signing_key=self.KEY).machine
+        frames = vehicle.advance(10.0)
+        assert frames
+        assert all(frame.data[2] & mavlink.MAVLINK_IFLAG_SIGNED for frame in frames)
+
+    def test_unsigned_frames_are_not_obeyed(self, on_ground):
+        ground = on_ground(signing_key=self.KEY)
+        message = mavlink.MAVLink_param_set_message(1, 1, b"COMPASS_MOT_X", 3.0, 9)
+        ground.machine.receive(ground.asker.pack(message), 1.0)
+        assert ground.machine.parameters["COMPASS_MOT_X"] == 0.0
+
+    @pytest.mark.parametrize(("key", "stored"), [(KEY, 3.0), (bytes(32), 0.0)])
+    def test_frames_signed_with_its_key_are_obeyed_and_others_not(self, on_ground, key, stored):
+        ground = on_ground(signing_key=self.KEY)
+        codec = mavlink.MAVLink(None, srcSystem=255, srcComponent=190)
+        codec.signing.secret_key, codec.signing.sign_outgoing = key, True
+        # Tens of microseconds since 2015; the simulated vehicle boots in June 2025.
+        codec.signing.timestamp = (1_750_000_001 - 1_420_070_400) * 100_000
+        message = mavlink.MAVLink_param_set_message(1, 1, b"COMPASS_MOT_X", 3.0, 9)
+        ground.machine.receive(bytes(message.pack(codec)), 1.0)
+        assert ground.machine.parameters["COMPASS_MOT_X"] == stored
 
 
 class TestWhatIsNotMavlink:
