@@ -32,6 +32,7 @@ NO_STAMP = -1
 # Messages are stamped a little before they are sent, so neighbours may stand in the wrong order.
 _DISORDER = SECOND
 _NEAR = 60 * SECOND
+_LATE_FRAMES = 10
 _USABLE_SHARE = 0.9
 
 
@@ -148,6 +149,10 @@ def _unroll(stamps: Stamps, arrival: OffsetArray) -> OffsetArray:
     back = step < -_DISORDER
     # Both clocks go back by the same amount: an older piece of the log, not a reboot.
     older = back & (waited < 0) & (np.abs(waited - step) < np.maximum(2 * SECOND, -step // 2))
+    # A few frames that took a longer way: the next ones are back where it was.
+    drops = np.flatnonzero(back)
+    soon = np.minimum(drops[:, np.newaxis] + 1 + np.arange(_LATE_FRAMES), len(step))
+    older[drops] |= stamps.time[soon].max(axis=1) >= stamps.time[drops] - _DISORDER
     reboot = back & ~older
     step = np.where(reboot, np.where(waited > 0, waited, SECOND), step)
     return np.concatenate([np.zeros(1, dtype=np.int64), np.cumsum(step)])
@@ -157,7 +162,7 @@ def _settle(stamps: Stamps, leader: Stamps, elapsed: OffsetArray, stream: _Strea
     """Times of another kind of message on the leading axis, where both agree."""
     before, after = _neighbours(leader.rows, stamps.rows, len(stream.arrival))
     expected = _between(elapsed, leader.rows, stamps.rows, (before, after), stream)
-    room = np.abs(elapsed[after] - elapsed[before]) + _DISORDER
+    room = np.abs(elapsed[after] - elapsed[before]) + np.where(before == after, _NEAR, _DISORDER)
     best = np.full(len(stamps.rows), np.iinfo(np.int64).max)
     settled = np.zeros(len(stamps.rows), dtype=np.int64)
     for neighbour in (before, after):

@@ -106,6 +106,17 @@ def test_a_reboot_begins_a_new_stretch_after_the_gap_the_recorder_saw() -> None:
     assert np.delete(np.diff(series.time), 49) == pytest.approx(0.1)
 
 
+def test_frames_that_took_a_longer_way_are_no_reboot() -> None:
+    sender = Sender()
+    stamps = [5000 + 100 * n for n in range(100)]
+    late = stamps[40:43]
+    order = stamps[:40] + stamps[43:63] + late + stamps[63:]
+    frames = [sender.heartbeat(), *(sender.attitude(t, roll=t / 1e6) for t in order)]
+    series = attitude(read(log(frames, lambda n: n * 100_000)))
+    assert np.diff(series.time) == pytest.approx(0.1)
+    assert series.value[:, 0] == pytest.approx(np.array(stamps) / 1e6)
+
+
 def test_microseconds_follow_their_vehicle_over_a_reboot() -> None:
     sender = Sender()
     frames = []
