@@ -18,7 +18,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-_MISTAKEN = 1e-6
+_MISTAKEN = 1e-8
 
 Key = TypeVar("Key", str, int)
 
@@ -103,7 +103,7 @@ class Exchange(Generic[Key]):
         """Askings after which silence means that there is no answer.
 
         From how often the other questions had to be asked: a question that
-        has an answer stays silent so often once in a million times.
+        has an answer stays silent so often once in 10⁸ times.
         """
         failures = self._askings_of_answered - self.answered
         failure_rate = (failures + 1) / (self._askings_of_answered + 2)
