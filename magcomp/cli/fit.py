@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import click
@@ -16,7 +15,7 @@ from magcomp.cli.options import (
     verbose_option,
 )
 from magcomp.cli.output import answer, complain, look
-from magcomp.cli.work import fit_log
+from magcomp.cli.work import fit_log, present_parameters
 from magcomp.errors import ExitCode
 from magcomp.fit import METHODS
 from magcomp.model import Analysis, Grade
@@ -83,8 +82,7 @@ def fit(
         # Rich is only worth its import where an answer is for people.
         from magcomp.report import as_text  # noqa: PLC0415
 
-        history = recording.parameters
-        present = {name: history.last(name, math.nan) for name in history.names}
+        present = present_parameters(recording)
         answer(as_text.analysis_text(analysis, present, look(), written=written, verbose=verbose))
     if analysis.grade is not Grade.REJECTED:
         return ExitCode.GOOD

@@ -36,3 +36,9 @@ def check_log(
         recording = read(log, system=system, progress=lambda share: step("reading the log", share))
         step("judging", 1.0)
         return recording, check(recording, options)
+
+
+def present_parameters(recording: Recording) -> dict[str, float]:
+    """Every parameter as the recording left it."""
+    history = recording.parameters
+    return {name: history.last(name, 0.0) for name in history.names}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 from rich.console import Console, Group, RenderableType
 from rich.padding import Padding
@@ -12,9 +13,9 @@ from rich.rule import Rule
 from rich.text import Text
 
 from magcomp import __version__
-from magcomp.model import Analysis, CompassResult, Grade, Recording, Vehicle, Verdict
+from magcomp.model import CURRENT, Analysis, CompassResult, Grade, Recording, Vehicle, Verdict
 from magcomp.report import tables, words
-from magcomp.report.bars import Row, bars
+from magcomp.report.bars import BEFORE_AFTER, Row, bars
 from magcomp.report.look import Look
 
 GRADE_STYLE = {Grade.GOOD: "bold green", Grade.MARGINAL: "bold yellow", Grade.REJECTED: "bold red"}
@@ -22,6 +23,11 @@ _GRADE_SIGN = {Grade.GOOD: "●", Grade.MARGINAL: "◐", Grade.REJECTED: "○"}
 
 _ALIKE_DEG, _ALIKE_SHARE = 0.5, 0.05
 """Compasses whose heading errors differ by less share one picture."""
+
+_AFTER_WRITING = (
+    "Load it with your ground station (MAVProxy: param load), fly once more, and run magcomp "
+    "check on the new log."
+)
 
 _DIGITS = re.compile(r"\d+(\.\d+)?")
 
@@ -33,6 +39,7 @@ def analysis_text(
     *,
     written: str | None = None,
     verbose: bool = False,
+    advise: bool = True,
 ) -> str:
     """What ``magcomp fit`` prints.
 
@@ -48,6 +55,8 @@ def analysis_text(
         The parameter file it went to, if any.
     verbose
         Every parameter and every level.
+    advise
+        End with where the parameters are, and what to do next.
     """
     return render(
         [
@@ -55,8 +64,8 @@ def analysis_text(
             *findings(analysis),
             *evidence(analysis),
             *_parameters(analysis, present, verbose=verbose),
-            *(tables.levels(result) for result in analysis.compasses if verbose),
-            *_ending(analysis, written),
+            *(_levels(analysis) if verbose else ()),
+            *(_ending(analysis, written) if advise else ()),
         ],
         look,
     )
@@ -67,14 +76,47 @@ def check_text(recording: Recording, verdicts: Mapping[int, Verdict], kind: str,
     parts: list[RenderableType] = [
         *heading(recording.source, recording.vehicle, recording.duration_s)
     ]
-    for compass, verdict in sorted(verdicts.items()):
-        parts.extend(_verdict(verdict.grade, [compass], verdict.reasons))
-        rows = [
-            Row(words.quantity(row.u, kind), (row.before, row.p95)) for row in verdict.heading_error
-        ]
-        parts.append(Text())
-        parts.append(bars("heading error", ("in force", "at most (95 %)"), rows))
+    results = [_Finding(compass, verdict, kind) for compass, verdict in sorted(verdicts.items())]
+    parts.extend(_findings(results, ("in force", "at most (95 %)"), ("red", "yellow")))
+    parts.append(Text())
+    parts.append(tables.check(verdicts, kind))
     return render(parts, look)
+
+
+def truth_text(source: str, rows: Sequence[tuple[float, float, float]], look: Look) -> str:
+    """Heading error against a simulation's truth.
+
+    Parameters
+    ----------
+    source
+        Where the truth stands.
+    rows
+        Current in A, and the true heading error before and after, degrees.
+    look
+        Width and colour.
+    """
+    drawn = [Row(words.quantity(u, CURRENT), (before, after)) for u, before, after in rows]
+    worst = max(after for _, _, after in rows)
+    return render(
+        [
+            Text(),
+            Rule(Text("the truth", style="bold"), align="left", style="dim"),
+            Text(f" {source}", style="dim", no_wrap=True, overflow="ignore"),
+            Padding(
+                Text(
+                    "The vehicle was simulated, so its true interference is known; the fit never "
+                    "saw it. With these parameters the heading of the worst compass is wrong by "
+                    f"at most {worst:.2f}°:"
+                ),
+                (0, 1),
+            ),
+            Text(),
+            *bars("heading error", ("before", "after"), drawn),
+            Text(),
+            _last("Now a log of your own:", "magcomp fit FLIGHT.tlog -o compass.param"),
+        ],
+        look,
+    )
 
 
 def render(parts: Iterable[RenderableType], look: Look) -> str:
@@ -97,72 +139,80 @@ def render(parts: Iterable[RenderableType], look: Look) -> str:
 
 def heading(source: str, vehicle: Vehicle, duration_s: float) -> Iterator[RenderableType]:
     """Whose recording this is."""
-    yield Rule(
-        Text(f"magcomp {__version__}", style="bold"), align="left", style="dim", characters="─"
-    )
-    line = Text(" ")
-    line.append(source, style="bold")
-    line.append(f", {words.duration(duration_s)} of {words.vehicle(vehicle)}")
-    yield line
+    yield Rule(Text(f"magcomp {__version__}", style="bold"), align="left", style="dim")
+    yield Text(f" {source}", style="bold", no_wrap=True, overflow="ignore")
+    yield Text(f" {words.duration(duration_s)} of {words.vehicle(vehicle)}")
     if vehicle.device_ids:
         ids = ", ".join(map(str, vehicle.device_ids))
         yield Text(f" compass device ids {ids}", style="dim")
 
 
+@dataclass(frozen=True)
+class _Finding:
+    compass: int
+    verdict: Verdict
+    regressor: str
+
+
 def findings(analysis: Analysis) -> Iterator[RenderableType]:
     """Verdict, reasons and picture of each compass; of compasses that are alike, once."""
-    for group in alike(analysis.compasses):
+    results = [_Finding(c.fit.compass, c.verdict, c.fit.regressor) for c in analysis.compasses]
+    return _findings(results, ("now", "corrected, at most (95 %)"), BEFORE_AFTER)
+
+
+def _findings(
+    results: Sequence[_Finding], columns: tuple[str, str], styles: tuple[str, str]
+) -> Iterator[RenderableType]:
+    for group in _alike(results):
         first = group[0]
-        numbers = [result.fit.compass for result in group]
-        yield from _verdict(first.verdict.grade, numbers, first.verdict.reasons)
+        yield Text()
+        yield _title(first.verdict.grade, [result.compass for result in group])
+        for reason in first.verdict.reasons:
+            yield Padding(Text(words.sentence(reason)), (0, 1, 0, 3))
         rows = [
-            Row(words.quantity(row.u, first.fit.regressor), (row.before, row.p95))
+            Row(words.quantity(row.u, first.regressor), (row.before, row.p95))
             for row in first.verdict.heading_error
         ]
         yield Text()
-        yield bars(f"heading error by {first.fit.regressor}", ("now", "corrected (95 %)"), rows)
+        yield from bars("heading error", columns, rows, styles)
 
 
-def _verdict(
-    grade: Grade, numbers: Sequence[int], reasons: Sequence[str]
-) -> Iterator[RenderableType]:
-    yield Text()
+def _title(grade: Grade, numbers: Sequence[int]) -> Text:
     title = Text(" ")
     title.append(f"{_GRADE_SIGN[grade]} {grade.value.upper()}", style=GRADE_STYLE[grade])
     title.append(f"  {words.compasses(numbers)}", style="bold")
     if len(numbers) > 1:
         title.append(f" (alike; the numbers are those of compass {numbers[0]})", style="dim")
-    yield title
-    for reason in reasons:
-        yield Padding(Text(words.sentence(reason)), (0, 0, 0, 3))
+    return title
 
 
-def alike(results: Sequence[CompassResult]) -> list[list[CompassResult]]:
+def _alike(results: Sequence[_Finding]) -> list[list[_Finding]]:
     """Compasses of the same verdict whose tables of heading error agree, together."""
-    groups: list[list[CompassResult]] = []
+    groups: list[list[_Finding]] = []
     for result in results:
-        for group in groups:
-            if _same(group[0], result):
-                group.append(result)
-                break
-        else:
+        group = next((group for group in groups if _same(group[0], result)), None)
+        if group is None:
             groups.append([result])
+        else:
+            group.append(result)
     return groups
 
 
-def _same(one: CompassResult, other: CompassResult) -> bool:
-    def wording(result: CompassResult) -> list[str]:
-        return [_DIGITS.sub("#", reason) for reason in result.verdict.reasons]
+def _same(one: _Finding, other: _Finding) -> bool:
+    def wording(finding: _Finding) -> list[str]:
+        return [_DIGITS.sub("#", reason) for reason in finding.verdict.reasons]
 
     def near(a: float, b: float) -> bool:
         return abs(a - b) <= max(_ALIKE_DEG, _ALIKE_SHARE * max(a, b))
 
-    rows = zip(one.verdict.heading_error, other.verdict.heading_error, strict=False)
+    tables_of = (one.verdict.heading_error, other.verdict.heading_error)
     return (
         one.verdict.grade is other.verdict.grade
         and wording(one) == wording(other)
-        and len(one.verdict.heading_error) == len(other.verdict.heading_error)
-        and all(near(a.before, b.before) and near(a.p95, b.p95) for a, b in rows)
+        and len(tables_of[0]) == len(tables_of[1])
+        and all(
+            near(a.before, b.before) and near(a.p95, b.p95) for a, b in zip(*tables_of, strict=True)
+        )
     )
 
 
@@ -197,32 +247,41 @@ def _parameters(
     values: dict[str, float] = {}
     for result in analysis.compasses:
         values.update(result.parameters)
-    if values:
+    if not values:
+        return
+    yield Text()
+    changes, unchanged = tables.parameters(values, present, verbose=verbose)
+    yield changes
+    if unchanged:
+        yield Padding(Text(f"unchanged: {', '.join(unchanged)}", style="dim"), (0, 0, 0, 1))
+
+
+def _levels(analysis: Analysis) -> Iterator[RenderableType]:
+    for result in analysis.compasses:
+        title = f" compass {result.fit.compass}: centre of the raw readings, mGauss"
         yield Text()
-        yield tables.parameters(values, present, verbose=verbose)
+        yield Text(title, style="bold")
+        yield tables.levels(result)
 
 
 def _ending(analysis: Analysis, written: str | None) -> Iterator[RenderableType]:
     yield Text()
-    rejected = [c.fit.compass for c in analysis.compasses if c.verdict.grade is Grade.REJECTED]
-    if analysis.grade is Grade.REJECTED and written is None:
-        yield _next("Nothing to write.", "Mend what the verdict names, record again and fit again.")
-        return
-    if written is None:
-        yield _next(
-            "Nothing is written yet.", f"Next: magcomp fit {analysis.source} -o compass.param"
-        )
+    accepted = analysis.grade is not Grade.REJECTED
+    if written is not None:
+        yield _last(f"Written to {written}.", _AFTER_WRITING)
+    elif accepted:
+        yield _last("Nothing is written yet.", "Add -o compass.param to write these parameters.")
     else:
-        yield _next(
-            f"Written to {written}.",
-            "Next: load it with your ground station (or MAVProxy: param load), fly, and run "
-            "magcomp check on the new log.",
-        )
-    if rejected and analysis.grade is not Grade.REJECTED:
-        yield _next("", f"Left out because rejected: {words.compasses(rejected)}.")
+        yield _last("Nothing to write.", "Mend what the verdict names, record again, fit again.")
+    rejected = [c.fit.compass for c in analysis.compasses if c.verdict.grade is Grade.REJECTED]
+    if rejected and accepted:
+        yield _last("", f"Left without compensation because rejected: {words.compasses(rejected)}.")
+    elif rejected and written is not None:
+        yield _last("", "The judge rejects this fit; it is written because of --force.")
 
 
-def _next(first: str, second: str) -> RenderableType:
-    text = Text(first, style="bold")
-    text.append(f"{' ' if first else ''}{second}", style="not bold")
+def _last(first: str, second: str) -> RenderableType:
+    text = Text()
+    text.append(first, style="bold")
+    text.append(f"{' ' if first else ''}{second}")
     return Padding(text, (0, 0, 0, 1))

@@ -2,49 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from rich.table import Table
 from rich.text import Text
 
-_EIGHTHS = " ▏▎▍▌▋▊▉"
+_EIGHTHS = ("", "▏", "▎", "▍", "▌", "▋", "▊", "▉")
+BEFORE_AFTER = ("red", "green")
 _WIDTH = 22
-_STYLES = ("red", "green")
 
 
 @dataclass(frozen=True)
 class Row:
-    """One control quantity: its name and a value in degrees for each column."""
+    """One control quantity: its name, and a value in degrees for each of the columns."""
 
     label: str
-    values: tuple[float, ...]
+    values: tuple[float, float]
 
 
-def bars(title: str, columns: Sequence[str], rows: Sequence[Row]) -> Table:
-    """A small plot: a row a control quantity, a bar a column, all to one scale."""
-    table = Table(box=None, pad_edge=False, padding=(0, 1), show_edge=False)
-    table.add_column(Text(""), justify="right", width=2)
-    table.add_column(Text("", style="dim"), justify="right", width=6)
-    for name in columns:
-        table.add_column(Text("", style="dim"), justify="right", width=7)
-        table.add_column(Text(name, style="dim"), width=_WIDTH)
+def bars(
+    title: str,
+    columns: tuple[str, str],
+    rows: Sequence[Row],
+    styles: tuple[str, str] = BEFORE_AFTER,
+) -> Iterator[Text]:
+    """A small plot: a line a control quantity, two bars a line, all to one scale."""
     largest = max((value for row in rows for value in row.values), default=0.0)
+    head = f"   {title:<16}"
+    yield Text(f"{head}{columns[0]:<{_WIDTH + 10}}{columns[1]}", style="dim")
     for row in rows:
-        cells = [Text(), Text(row.label, style="dim")]
-        for value, style in zip(row.values, _STYLES, strict=False):
-            cells.append(Text(f"{value:.1f}°"))
-            cells.append(Text(bar(value, largest, _WIDTH), style=style))
-        table.add_row(*cells)
-    table.title = Text(
-        f"   {title}, the largest of all headings, level and tilted by 20°", style="dim"
-    )
-    table.title_justify = "left"
-    return table
+        line = Text(f"{row.label:>9}", style="dim")
+        for value, style in zip(row.values, styles, strict=True):
+            line.append(f"{value:8.1f}°  ", style="not dim")
+            line.append(f"{bar(value, largest, _WIDTH):<{_WIDTH}}", style=f"not dim {style}")
+        yield line
 
 
 def bar(value: float, largest: float, width: int) -> str:
     """A bar whose full ``width`` is ``largest``; never empty, so that small is not none."""
     eighths = round(value / largest * width * 8) if largest > 0.0 else 0
     full, rest = divmod(min(max(eighths, 1), width * 8), 8)
-    return "█" * full + _EIGHTHS[rest].strip()
+    return "█" * full + _EIGHTHS[rest]

@@ -4,98 +4,102 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from rich.table import Table
 from rich.text import Text
 
-from magcomp.model import CURRENT, CompassResult
+from magcomp.model import CURRENT, CompassResult, MotorFit, Verdict
 from magcomp.report import words
 
 _VECTOR = re.compile(r"(COMPASS_[A-Z]+[23]?)_([XYZ])")
 
-_Cell = Callable[[CompassResult], str]
+
+class _Columns:
+    """A table with a column a compass, in sections."""
+
+    def __init__(self, compasses: Sequence[int]) -> None:
+        self.table = Table(box=None, pad_edge=False, padding=(0, 1), show_edge=False)
+        self.table.add_column()
+        for compass in compasses:
+            title = Text(f"compass {compass}", style="bold")
+            self.table.add_column(title, justify="right", min_width=15)
+
+    def section(self, title: str) -> None:
+        self.table.add_row(Text(f" {title}"))
+
+    def row(self, name: str, cells: Iterable[str]) -> None:
+        self.table.add_row(Text(f"   {name}", style="dim"), *map(Text, cells))
 
 
 def evidence(results: Sequence[CompassResult]) -> Table:
     """Interference, unexplained field, lags, line and coverage."""
-    regressor = results[0].fit.regressor
-    table = Table(box=None, pad_edge=False, padding=(0, 1), show_edge=False)
-    table.add_column()
-    for result in results:
-        table.add_column(
-            Text(f"compass {result.fit.compass}", style="bold"), justify="right", min_width=15
-        )
-
-    def section(name: str, unit: str) -> None:
-        title = Text(f" {name}")
-        title.append(f" {unit}", style="dim")
-        table.add_row(title, *[Text() for _ in results])
-
-    def row(name: str, cell: _Cell) -> None:
-        table.add_row(Text(f"   {name}", style="dim"), *[Text(cell(result)) for result in results])
-
-    section("motors add", words.per_unit(regressor))
+    fits = [result.fit for result in results]
+    verdicts = [result.verdict for result in results]
+    regressor = fits[0].regressor
+    columns = _Columns([fit.compass for fit in fits])
+    columns.section(words.interference_title(regressor))
     for index, axis in enumerate(("forward", "right", "down")):
-        row(axis, _interference(index))
-    section("unexplained field", "mGauss")
-    row("now", lambda r: f"{r.verdict.residual.held_out_before:.1f}")
-    row("corrected, on unseen data", lambda r: f"{r.verdict.residual.held_out:.1f}")
-    row("corrected, on fitted data", lambda r: f"{r.verdict.residual.after:.1f}")
-    section("lags", "ms")
-    row(
-        "compass behind attitude",
-        lambda r: words.milliseconds(r.fit.lags.field, r.fit.lags_std.field),
+        pairs = ((f.interference[index], f.interference_std[index]) for f in fits)
+        columns.row(axis, (words.with_std(float(value), float(std)) for value, std in pairs))
+    columns.section("unexplained field, mGauss")
+    columns.row("now", (f"{v.residual.held_out_before:.1f}" for v in verdicts))
+    columns.row("corrected", (f"{v.residual.after:.1f}" for v in verdicts))
+    columns.row("corrected, unseen data", (f"{v.residual.held_out:.1f}" for v in verdicts))
+    columns.section("compass lags, ms")
+    columns.row(
+        "behind attitude",
+        (words.milliseconds(f.lags.field, f.lags_std.field) for f in fits),
     )
-    row(
-        f"compass behind {regressor}",
-        lambda r: words.milliseconds(r.fit.lags.regressor, r.fit.lags_std.regressor),
+    columns.row(
+        f"behind {regressor}",
+        (words.milliseconds(f.lags.regressor, f.lags_std.regressor) for f in fits),
     )
-    section("the shift's line", "mGauss")
-    row("off a line of", _line)
-    section("covered", "")
-    row(regressor, _range)
-    row("headings, directions", _shares)
-    row("tilt, time", _tilt)
-    return table
+    columns.section("line of the shift, mGauss")
+    columns.row("straight to", map(_line, fits))
+    _coverage(columns, verdicts, regressor)
+    return columns.table
 
 
-def _interference(axis: int) -> _Cell:
-    def cell(result: CompassResult) -> str:
-        fit = result.fit
-        return words.with_std(float(fit.interference[axis]), float(fit.interference_std[axis]))
+def check(verdicts: Mapping[int, Verdict], regressor: str) -> Table:
+    """What a check of the calibration in force rests on."""
+    columns = _Columns(sorted(verdicts))
+    ordered = [verdicts[compass] for compass in sorted(verdicts)]
+    columns.section("unexplained field, mGauss")
+    columns.row("in force", (f"{verdict.residual.before:.1f}" for verdict in ordered))
+    _coverage(columns, ordered, regressor)
+    return columns.table
 
-    return cell
+
+def _coverage(columns: _Columns, verdicts: Sequence[Verdict], regressor: str) -> None:
+    covered = [verdict.coverage for verdict in verdicts]
+    columns.section("covered")
+    columns.row(
+        regressor,
+        (
+            f"{words.quantity(c.u_low, regressor)} … {words.quantity(c.u_high, regressor)}"
+            for c in covered
+        ),
+    )
+    columns.row("of the full turn", (f"{100 * c.heading:.0f} %" for c in covered))
+    columns.row("of all directions", (f"{100 * c.sphere:.0f} %" for c in covered))
+    columns.row("tilt, time", (f"{c.tilt_deg:.0f}°, {c.seconds:.0f} s" for c in covered))
 
 
-def _line(result: CompassResult) -> str:
-    line = result.fit.line
-    if line is None:
+def _line(fit: MotorFit) -> str:
+    if fit.line is None:
         return "–"
-    return f"{line.rms:.2f} of {float(np.ptp(line.positions)):.0f}"
-
-
-def _range(result: CompassResult) -> str:
-    covered = result.verdict.coverage
-    low, high = (words.quantity(u, result.fit.regressor) for u in (covered.u_low, covered.u_high))
-    return f"{low} … {high}"
-
-
-def _shares(result: CompassResult) -> str:
-    covered = result.verdict.coverage
-    return f"{100 * covered.heading:.0f} %, {100 * covered.sphere:.0f} %"
-
-
-def _tilt(result: CompassResult) -> str:
-    covered = result.verdict.coverage
-    return f"{covered.tilt_deg:.0f}°, {covered.seconds:.0f} s"
+    return f"{fit.line.rms:.2f} in {float(np.ptp(fit.line.positions)):.0f}"
 
 
 def parameters(
     values: Mapping[str, float], present: Mapping[str, float], *, verbose: bool
-) -> Table:
-    """What would be written: old → new, a row a vector; unchanged vectors only where verbose."""
+) -> tuple[Table, list[str]]:
+    """What would be written: old → new, a row a vector; and the vectors that stay as they are.
+
+    Where verbose, those are in the table too.
+    """
     table = Table(box=None, pad_edge=False, padding=(0, 1), show_edge=False)
     table.add_column(Text(" parameter", style="dim"))
     for axis in "XYZ":
@@ -105,12 +109,9 @@ def parameters(
         if not verbose and all(_same(values[m], present.get(m, math.nan)) for m in members):
             unchanged.append(name)
             continue
-        cells = [_change(values[m], present.get(m, math.nan)) for m in members]
+        cells = [_change(m, values[m], present.get(m, math.nan)) for m in members]
         table.add_row(Text(f" {name}"), *cells)
-    if unchanged:
-        table.caption = Text(f" unchanged: {', '.join(unchanged)}", style="dim")
-        table.caption_justify = "left"
-    return table
+    return table, unchanged
 
 
 def _vectors(values: Mapping[str, float]) -> dict[str, list[str]]:
@@ -126,13 +127,14 @@ def _same(new: float, old: float) -> bool:
     return bool(np.float32(new) == np.float32(old))
 
 
-def _change(new: float, old: float) -> Text:
+def _change(name: str, new: float, old: float) -> Text:
+    decimals = 2 if "_OFS" in name else 4 if "_DIA" in name or "_ODI" in name else 3
     if _same(new, old):
-        return Text(words.number(new), style="dim")
+        return Text(words.number(new, decimals), style="dim")
     text = Text()
     if math.isfinite(old):
-        text.append(f"{words.number(old)} → ", style="dim")
-    text.append(words.number(new), style="bold")
+        text.append(f"{words.number(old, decimals)} → ", style="dim")
+    text.append(words.number(new, decimals), style="bold")
     return text
 
 
@@ -140,8 +142,6 @@ def levels(result: CompassResult) -> Table:
     """Centre of the ellipsoid at each level of the control quantity: the paper's Fig. 4."""
     fit = result.fit
     table = Table(box=None, pad_edge=False, padding=(0, 1), show_edge=False)
-    table.title = Text(f"\n compass {fit.compass}: centre of the readings, mGauss", style="bold")
-    table.title_justify = "left"
     table.add_column(Text(f"   {fit.regressor}", style="dim"), justify="right", min_width=10)
     for axis in "xyz":
         table.add_column(Text(axis, style="dim"), justify="right", min_width=15)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from datetime import UTC, datetime
 
 from magcomp.model import CURRENT, Vehicle
 
+_MOST_DECIMALS = 3
 _AUTOPILOTS = {"ardupilot": "ArduPilot", "px4": "PX4"}
 
 
@@ -16,28 +16,30 @@ def quantity(u: float, regressor: str) -> str:
     return f"{u:.0f} A" if regressor == CURRENT else f"{100 * u:.0f} %"
 
 
-def per_unit(regressor: str) -> str:
-    """Unit of an interference vector."""
-    return "mGauss per A" if regressor == CURRENT else "mGauss at full throttle"
+def interference_title(regressor: str) -> str:
+    """What an interference vector is, with its unit."""
+    return "motors add, mGauss per A" if regressor == CURRENT else "motors add at full, mGauss"
 
 
 def with_std(value: float, std: float) -> str:
-    """A value to the two significant digits of its standard error: ``-1.126 ± 0.020``."""
+    """A value to the two significant digits of its standard error: ``-1.126 ± 0.020``.
+
+    No more than three decimals: the field is known to no more than that.
+    """
     if not math.isfinite(std) or std <= 0.0:
         return number(value)
-    decimals = min(max(1 - math.floor(math.log10(std)), 0), 4)
-    return f"{value:.{decimals}f} ± {std:.{decimals}f}"
+    decimals = min(max(1 - math.floor(math.log10(std)), 0), _MOST_DECIMALS)
+    shown = max(std, 10.0**-_MOST_DECIMALS)
+    # Adding 0 turns a rounded −0 into 0.
+    return f"{round(value, decimals) + 0.0:.{decimals}f} ± {shown:.{decimals}f}"
 
 
-def number(value: float) -> str:
-    """A parameter's value, to a precision no autopilot notices."""
+def number(value: float, decimals: int = _MOST_DECIMALS) -> str:
+    """A value to some decimals, without noughts at its end; a question mark where it is none."""
     if not math.isfinite(value):
         return "?"
-    size = abs(value)
-    decimals = 1 if size >= 1000 else 2 if size >= 100 else 3
-    text = f"{value:.{decimals}f}"
-    text = text.rstrip("0").rstrip(".")
-    return "0" if text in ("", "-0") else text
+    text = f"{round(value, decimals) + 0.0:.{decimals}f}"
+    return text.rstrip("0").rstrip(".") if decimals else text
 
 
 def milliseconds(value: float, std: float) -> str:
@@ -58,14 +60,6 @@ def duration(seconds: float) -> str:
     if minutes < 60:
         return f"{minutes} min {rest} s"
     return f"{minutes // 60} h {minutes % 60} min"
-
-
-def date(unix_s: float) -> str:
-    """Day of a recording, UTC; empty where it is unknown or cannot be."""
-    try:
-        return datetime.fromtimestamp(unix_s, UTC).strftime("%Y-%m-%d")
-    except (OverflowError, OSError, ValueError):
-        return ""
 
 
 def listed(items: Sequence[object]) -> str:
