@@ -99,7 +99,7 @@ def test_on_a_good_link_an_unknown_name_costs_seconds_not_minutes() -> None:
     _, link, clock = linked()
     begin = clock.now
     assert fetch(link, QUAD, [*OLD, "COMPASS_MOT4_X"], clock=clock) == OLD
-    assert clock.now - begin < 4.0
+    assert clock.now - begin < 6.0
 
 
 def test_a_vehicle_that_says_so_makes_a_name_missing_at_once() -> None:
