@@ -26,8 +26,10 @@ from magcomp.log.assemble import recording_from_bytes
 from magcomp.log.columns import WANTED, Message
 from magcomp.model import FloatArray, Recording
 
-DEFAULT_LIMIT = 16 << 20
-"""Bytes: about half an hour of everything at 50 Hz, or more than an hour thinned."""
+DEFAULT_LIMIT = 8 << 20
+"""Bytes: a quarter of an hour of three compasses at 50 Hz whole, most of an hour thinned.
+
+Reading a snapshot of this size takes about a tenth of a second."""
 
 LEVELS = 10
 """Control levels of the coverage: a tenth of full throttle each."""
