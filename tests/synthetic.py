@@ -1,0 +1,167 @@
+"""Recordings made of formulas: every number a fit should find is put in by hand.
+
+Unlike magcomp.simulate there is no autopilot and no physics here, only the
+model the fits assume, so a fit that misses its numbers is wrong and nothing else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from magcomp.align import controls, readings, reported
+from magcomp.autopilot import ardupilot
+from magcomp.earth import EarthField, expected_field
+from magcomp.fit import Problem
+from magcomp.geometry import body_from_earth
+from magcomp.model import (
+    Correction,
+    ParameterChange,
+    ParameterHistory,
+    ReadReport,
+    Recording,
+    Series,
+    Vehicle,
+)
+
+FloatArray = NDArray[np.float64]
+
+HOME = (47.3977, 8.5456, 488.0)
+UNIX_S = 1.7e9
+
+INTERFERENCE = np.array([1.4, -0.8, 1.9])
+EXACT = Correction(
+    offset=np.array([60.0, -35.0, 20.0]),
+    soft_iron=np.array([[1.06, 0.03, -0.02], [0.03, 0.95, 0.01], [-0.02, 0.01, 1.02]]),
+    motor=-INTERFERENCE,
+)
+
+
+def earth() -> EarthField:
+    """The field at HOME."""
+    return expected_field(*HOME, UNIX_S)
+
+
+def waves(rng: np.random.Generator, time: FloatArray, slow: float, fast: float) -> FloatArray:
+    """A smooth random function of time with a root mean square of about 1."""
+    period = np.exp(rng.uniform(np.log(fast), np.log(slow), 8))
+    phase = rng.uniform(0.0, 2 * np.pi, 8)
+    return np.asarray(np.sin(2 * np.pi * np.multiply.outer(time, 1 / period) + phase).sum(1) / 2.0)
+
+
+@dataclass(frozen=True)
+class Flown:
+    """How a recording is made.
+
+    Attributes
+    ----------
+    exact
+        The correction that undoes everything; its motor vector per ampere.
+    in_force
+        Parameters the autopilot corrected with; the exact ones without motors by default.
+    changed
+        Parameters that took another value at a time.
+    field_lag, current_lag
+        Delays, seconds (magcomp.model.Lags).
+    """
+
+    seed: int = 1
+    seconds: float = 180.0
+    exact: Correction = EXACT
+    in_force: Mapping[str, float] | None = None
+    changed: tuple[ParameterChange, ...] = ()
+    field_lag: float = 0.07
+    current_lag: float = 0.05
+    noise: float = 1.0
+    truncated: bool = False
+    tilt: float = 0.15
+    amperes: float = 25.0
+    swing: float = 8.0
+    slow_s: float = 15.0
+    fast_s: float = 2.5
+    current_hz: float = 10.0
+    compasses: tuple[int, ...] = (1,)
+    extra: Mapping[str, float] = field(default_factory=dict)
+
+    def current_at(self, time: FloatArray) -> FloatArray:
+        """The true current, A."""
+        rng = np.random.default_rng([self.seed, 1])
+        wave = waves(rng, time, self.slow_s, self.fast_s)
+        return np.maximum(self.amperes + self.swing * wave, 0.0)
+
+    def attitude_at(self, time: FloatArray) -> FloatArray:
+        """Roll, pitch, yaw, shape (n, 3)."""
+        rng = np.random.default_rng([self.seed, 2])
+        roll, pitch = (self.tilt * waves(rng, time, 12.0, 3.0) for _ in range(2))
+        yaw = 2.0 * waves(rng, time, 40.0, 15.0) + 0.05 * time
+        return np.stack([roll, pitch, yaw], axis=1)
+
+    def sensed_at(self, time: FloatArray, compass: int = 1) -> FloatArray:
+        """Raw sensor field measured at ``time``, without noise, mGauss, shape (n, 3)."""
+        roll, pitch, yaw = self.attitude_at(time).T
+        true = body_from_earth(roll, pitch, yaw) @ earth().ned
+        measured = time + self.field_lag
+        return self.raw_of(true, self.current_at(measured - self.current_lag))
+
+    def raw_of(self, true: FloatArray, amperes: FloatArray) -> FloatArray:
+        """Sensor field of a true body-axes field, mGauss, shape (n, 3)."""
+        disturbed = true - np.multiply.outer(amperes, self.exact.motor)
+        return disturbed @ np.linalg.inv(self.exact.soft_iron).T - self.exact.offset
+
+    def parameters(self) -> dict[str, float]:
+        """What was in force at the start."""
+        if self.in_force is not None:
+            return dict(self.in_force)
+        values: dict[str, float] = {ardupilot.COMPENSATION_SWITCH: 0.0}
+        for compass in self.compasses:
+            unmoved = replace(self.exact, motor=np.zeros(3))
+            values |= ardupilot.correction_parameters(unmoved, compass, 1.0)
+        return values
+
+    def recording(self) -> Recording:
+        """What the autopilot would have reported."""
+        rng = np.random.default_rng([self.seed, 3])
+        time = np.arange(1.0, self.seconds, 0.1)
+        grid = np.arange(0.0, self.seconds + 1.0, 0.02)
+        slow = np.arange(0.0, self.seconds + 1.0, 1.0 / self.current_hz)
+        start = self.parameters()
+        history = ParameterHistory(
+            (*(ParameterChange(0.0, n, v) for n, v in start.items()), *self.changed)
+        )
+        fields = {}
+        for compass in self.compasses:
+            raw = self.sensed_at(time - self.field_lag, compass)
+            raw = raw + rng.normal(scale=self.noise, size=raw.shape)
+            now = self.current_at(time - self.current_lag)
+            reported_field = np.empty_like(raw)
+            for index, moment in enumerate(time):
+                calibration = ardupilot.calibration_at(history, compass, float(moment))
+                reported_field[index] = ardupilot.correct(raw[index], now[index], calibration)
+            if self.truncated:
+                reported_field = np.trunc(reported_field)
+            fields[compass] = Series(time, reported_field)
+        return Recording(
+            source="synthetic",
+            vehicle=Vehicle("ardupilot", "copter", 1, 1, "4.6.3", (97539,)),
+            start_unix_s=UNIX_S,
+            duration_s=self.seconds,
+            field=fields,
+            parameters=history,
+            report=ReadReport(0, 0, 0),
+            attitude=Series(grid, self.attitude_at(grid)),
+            current=Series(slow, self.current_at(slow)),
+            position=Series(np.array([0.0]), np.array([HOME])),
+        )
+
+    def problem(self, compass: int = 1) -> Problem:
+        """The same, ready to be fitted against the battery current."""
+        return problem_of(self.recording(), compass)
+
+
+def problem_of(recording: Recording, compass: int = 1) -> Problem:
+    """A compass of a recording against its first control quantity, earth field at HOME."""
+    found = controls(recording)
+    return Problem(readings(recording, compass), found[0], reported(found), earth())
