@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from dataclasses import fields
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from magcomp.errors import LogError
 from magcomp.link import Recorder, connect
 from magcomp.link.address import Replay
 from magcomp.link.replay import records
+from magcomp.link.state import LinkState
 from magcomp.log import read_tlog
 from magcomp.model import Recording, Series
 
@@ -265,3 +267,29 @@ class TestCoverage:
         thinned, whole = filled(FIXTURE, limit=200_000), filled(FIXTURE)
         assert thinned.size < whole.size
         np.testing.assert_array_equal(thinned.coverage().counts, whole.coverage().counts)
+
+
+def test_three_compasses_at_fifty_hertz_cost_a_tenth_of_a_core_at_most(tmp_path):
+    vehicle, state, buffer = FakeVehicle(), LinkState(system=1), Buffer("x")
+    imu, seconds = (1, 2, -1000, 3, 4, 5, 100, 200, 300), 60
+    spent = 0.0
+    with Recorder(tmp_path / "a.tlog") as recorder:
+        for step in range(seconds * 50):
+            now = step * 0.02
+            stamp_us, boot_ms = UNIX_US + round(now * 1e6), round(now * 1e3)
+            raw = vehicle.heartbeat() if step % 50 == 0 else b""
+            raw += vehicle.attitude(now)
+            raw += vehicle.pack(mavlink.MAVLink_raw_imu_message(boot_ms * 1000, *imu))
+            raw += vehicle.pack(mavlink.MAVLink_scaled_imu2_message(boot_ms, *imu))
+            raw += vehicle.pack(mavlink.MAVLink_scaled_imu3_message(boot_ms, *imu))
+            began = time.process_time()
+            for received in state.receive(raw, now):
+                recorder.add(stamp_us, received.frame.raw)
+                buffer.add(stamp_us, received.frame.raw)
+            state.due(now)
+            if step % 50 == 49:
+                buffer.snapshot()
+            spent += time.process_time() - began
+    assert recorder.frames == seconds * 201
+    assert len(buffer.snapshot().field[3]) == seconds * 50
+    assert spent / seconds < 0.1

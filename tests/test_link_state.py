@@ -10,6 +10,7 @@ import pytest
 from link_vehicle import DEVICE_IDS, FakeVehicle, play
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from magcomp.errors import UsageError
 from magcomp.link.events import GapEnded, GapStarted, VehicleFound, VehicleRebooted
 from magcomp.link.framing import Framer
 from magcomp.link.quality import RateMeter, SequenceCounter
@@ -255,6 +256,39 @@ class TestReboots:
         assert not [e for e in state.take_events() if isinstance(e, VehicleRebooted)]
 
 
+class TestAnotherVehicleInItsPlace:
+    def swapped(self, answers=True):
+        state = LinkState(system=1)
+        play(state, [FakeVehicle()], 0.0, 5.0)
+        state.take_events()
+        state.closed(5.0, "unplugged")
+        state.reopened(7.0)
+        other = FakeVehicle()
+        other.parameters = {"COMPASS_DEV_ID": 4711.0, "COMPASS_DEV_ID2": 0, "COMPASS_DEV_ID3": 0}
+        if not answers:
+            other.parameters = {}
+        play(state, [other], 7.0, 5.0)
+        return state
+
+    def test_it_is_noticed_after_a_cable_was_pulled(self):
+        state = self.swapped()
+        found = [e.vehicle for e in state.take_events() if isinstance(e, VehicleFound)]
+        assert [vehicle.device_ids for vehicle in found] == [(4711,)]
+        assert state.vehicle == found[0]
+
+    def test_no_answer_leaves_the_identity_that_was_known(self):
+        state = self.swapped(answers=False)
+        assert state.vehicle.device_ids == tuple(DEVICE_IDS.values())
+        assert not [e for e in state.take_events() if isinstance(e, VehicleFound)]
+
+    def test_the_same_one_is_not_announced_again(self):
+        vehicle, state = FakeVehicle(), LinkState(system=1)
+        play(state, [vehicle], 0.0, 5.0)
+        state.reopened(5.0)
+        play(state, [vehicle], 5.0, 5.0)
+        assert len([e for e in state.take_events() if isinstance(e, VehicleFound)]) == 1
+
+
 WANTED = {"RAW_IMU": 50.0, "ATTITUDE": 25.0, "VFR_HUD": 10.0}
 IDS = {name: getattr(mavlink, f"MAVLINK_MSG_ID_{name}") for name in WANTED}
 
@@ -357,6 +391,14 @@ class TestStreams:
                 state.receive(vehicle.hear(state.pack(message, 0)), now)
                 unanswered -= setting
         assert set(vehicle.interval_us) == set(IDS.values())
+
+    @pytest.mark.parametrize("rates", [{"GPS_RTK": 5.0}, {"RAW_IMU": 0.0}, {"ATTITUDE": math.nan}])
+    def test_a_stream_that_cannot_be_is_refused(self, rates):
+        vehicle, state = FakeVehicle(), LinkState(system=1)
+        play(state, [vehicle], 0.0, 2.0)
+        with pytest.raises(UsageError, match="must be one of RAW_IMU, ") as refusal:
+            state.request_streams(rates, 2.0)
+        assert next(iter(rates)) in str(refusal.value)
 
     def test_a_slow_line_slows_all_streams_alike(self):
         slow = affordable(DEFAULT_RATES, 5760)

@@ -12,17 +12,19 @@ from magcomp.link.address import (
     parse_address,
     serial_ports,
 )
-from magcomp.link.connection import Connection, FrameSink, connect
+from magcomp.link.connection import Connection, connect
 from magcomp.link.events import (
     GapEnded,
     GapStarted,
     LinkEvent,
+    SinkFailed,
     VehicleFound,
     VehicleRebooted,
 )
 from magcomp.link.quality import Gap, LinkStatistics
 from magcomp.link.recorder import Recorder
 from magcomp.link.signing import read_signing_key
+from magcomp.link.sinks import FrameSink
 from magcomp.link.streams import DEFAULT_RATES, StreamReport
 
 __all__ = [
@@ -39,6 +41,7 @@ __all__ = [
     "Replay",
     "SerialLine",
     "SerialPort",
+    "SinkFailed",
     "StreamReport",
     "TcpClient",
     "TcpServer",

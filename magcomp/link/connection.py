@@ -6,9 +6,9 @@ import threading
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from types import TracebackType
-from typing import Protocol, Self
+from typing import Self
 
-from magcomp.errors import InputError, LinkError, LinkTimeoutError
+from magcomp.errors import LinkError, LinkTimeoutError
 from magcomp.link.address import (
     Address,
     SerialLine,
@@ -18,10 +18,11 @@ from magcomp.link.address import (
 )
 from magcomp.link.clock import Clock, SystemClock
 from magcomp.link.diagnosis import why_no_vehicle
-from magcomp.link.events import LinkEvent, SinkFailed
+from magcomp.link.events import LinkEvent
 from magcomp.link.framing import Message
 from magcomp.link.opening import open_transport
 from magcomp.link.quality import LinkStatistics
+from magcomp.link.sinks import FrameSink, Sinks
 from magcomp.link.state import LinkState
 from magcomp.link.streams import DEFAULT_RATES, StreamReport, affordable
 from magcomp.link.transport import ReplayEndedError, Transport, TransportClosedError
@@ -35,14 +36,6 @@ _REOPEN_LONGEST_S = 2.0
 _REOPEN_AFTER_SILENCE_S = 10.0
 _RESTORE_S = 3.0
 _SLOW_BAUD = 115_200
-
-
-class FrameSink(Protocol):
-    """Takes every frame as it arrives: a Recorder, a Buffer."""
-
-    def add(self, unix_us: int, frame: bytes) -> None:
-        """Take one whole frame that arrived at ``unix_us``."""
-        ...
 
 
 class Connection:
@@ -82,7 +75,7 @@ class Connection:
         self.address = address
         self._opener = opener
         self._system = system
-        self._sinks = list(sinks)
+        self._sinks = Sinks(sinks)
         self._transport = opener()
         clock = self._transport.clock
         self._state = LinkState(system=system, key=key, unix_us=clock.unix_us())
@@ -212,6 +205,8 @@ class Connection:
         ------
         LinkTimeoutError
             No vehicle has been found yet.
+        UsageError
+            A message magcomp does not stream, or a rate that is not above 0.
         """
         address = self.address
         if isinstance(address, SerialLine) and address.baud < _SLOW_BAUD:
@@ -279,21 +274,13 @@ class Connection:
         with self._changed:
             now, unix_us = self._now(), self._transport.clock.unix_us()
             for received in self._state.receive(data, now):
-                self._feed_sinks(unix_us, received.frame.raw)
+                self._events.extend(self._sinks.add(unix_us, received.frame.raw, now))
                 if received.from_vehicle:
                     self._inbox.append(received.frame.message)
             for message in self._state.due(now):
                 self._write(message)
             self._events.extend(self._state.take_events())
             self._changed.notify_all()
-
-    def _feed_sinks(self, unix_us: int, raw: bytes) -> None:
-        for sink in tuple(self._sinks):
-            try:
-                sink.add(unix_us, raw)
-            except InputError as error:
-                self._sinks.remove(sink)
-                self._events.append(SinkFailed(self._now(), error))
 
     def _write(self, message: Message) -> None:
         raw = self._state.pack(message, self._transport.clock.unix_us())

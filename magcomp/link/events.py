@@ -9,7 +9,10 @@ from magcomp.model import Vehicle
 
 @dataclass(frozen=True)
 class VehicleFound:
-    """The vehicle of this link is known; ``time`` in seconds of the link's clock."""
+    """The vehicle of this link is known; ``time`` in seconds of the link's clock.
+
+    Comes again when, after a gap or a reboot, another one answers in its place.
+    """
 
     time: float
     vehicle: Vehicle

@@ -69,7 +69,7 @@ class LinkState:
         self._foreign: dict[str, int] = {}
         self._vehicle: tuple[int, int] | None = None
         self._found_at = math.inf
-        self._announced = False
+        self._known: Vehicle | None = None
         self._identification: Identification | None = None
         self._streams: StreamControl | None = None
         self._sequence = SequenceCounter()
@@ -89,7 +89,9 @@ class LinkState:
     @property
     def vehicle(self) -> Vehicle | None:
         """The vehicle as far as known; None before its first heartbeat."""
-        return self._identification.vehicle if self._identification else None
+        if self._known is not None or self._identification is None:
+            return self._known
+        return self._identification.vehicle
 
     @property
     def heartbeats(self) -> tuple[Heartbeat, ...]:
@@ -164,8 +166,7 @@ class LinkState:
         self._framer.reset()
         self._sequence.restart()
         self._next_heartbeat = now
-        if self._streams is not None:
-            self._streams.repeat()
+        self._ask_again()
 
     def closed(self, now: float, reason: str) -> None:
         """The transport was lost: the gap begins at the last frame heard."""
@@ -177,8 +178,8 @@ class LinkState:
 
         Raises
         ------
-        KeyError
-            A name magcomp does not stream.
+        UsageError
+            A name magcomp does not stream, or a rate that is not above 0.
         """
         if self._vehicle is not None:
             self._streams = self._streams or StreamControl(self._vehicle)
@@ -267,12 +268,13 @@ class LinkState:
             self._foreign[name] = self._foreign.get(name, 0) + 1
 
     def _announce(self, now: float) -> None:
-        vehicle = self.vehicle
-        if self._announced or vehicle is None:
+        if self._identification is None or not (self.settled(now) and self.identified(now)):
             return
-        if self.settled(now) and self.identified(now):
-            self._announced = True
-            self._events.append(VehicleFound(now, vehicle))
+        found = self._identification.vehicle
+        unanswered = self._known is not None and not found.device_ids
+        if found != self._known and not unanswered:
+            self._known = found
+            self._events.append(VehicleFound(now, found))
 
     def _take_timesync(self, message: Message, now: float) -> None:
         asked = self._asked_at.pop(message.ts1, None) if message.tc1 != 0 else None
@@ -293,8 +295,14 @@ class LinkState:
             self._boot_ms = boot_ms
             self._sequence.restart()
             self._events.append(VehicleRebooted(now))
-            if self._streams is not None:
-                self._streams.repeat()
+            self._ask_again()
+
+    def _ask_again(self) -> None:
+        """Take nothing for granted: another vehicle may be there, or this one has forgotten."""
+        if self._vehicle is not None:
+            self._identification = Identification(self._heartbeats[self._vehicle])
+        if self._streams is not None:
+            self._streams.repeat()
 
     def _open_gap(self, now: float, reason: str) -> None:
         start = min(self._last_heard, now)

@@ -20,6 +20,7 @@ from types import MappingProxyType
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from magcomp.errors import UsageError
 from magcomp.link.framing import (
     GROUND_STATION_COMPONENT,
     GROUND_STATION_SYSTEM,
@@ -162,15 +163,21 @@ class StreamControl:
 
         Raises
         ------
-        KeyError
-            A message that magcomp does not stream.
+        UsageError
+            A message that magcomp does not stream, or a rate that is not above 0.
         """
+        for name, rate in rates.items():
+            if name not in _IDS or not rate > 0:
+                raise UsageError(
+                    f"A stream must be one of {', '.join(_IDS)} at a rate above 0; "
+                    f"instead received {name} at {rate:g} Hz."
+                )
         for name in rates:
             if name not in self._previous_us and not self._restoring:
                 self._asking[name] = _Question(name)
                 self._previous_hz.setdefault(name, measured.get(name, 0.0))
         self._restoring = False
-        self._wanted.update({name: rates[name] for name in rates if _IDS[name]})
+        self._wanted.update(rates)
         self.repeat()
 
     def repeat(self) -> None:
