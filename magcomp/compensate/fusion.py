@@ -20,6 +20,8 @@ from magcomp.compensate.compensator import Compensator
 from magcomp.model import FloatArray
 
 _TURN = 2 * math.pi
+_LEAST_COS_PITCH = 0.25
+"""With the nose straight up or down there is no heading to compare with."""
 
 
 @dataclass(frozen=True)
@@ -289,7 +291,8 @@ def fuse(
     for event in events:
         if isinstance(event, Reading):
             corrected = compensator.correct(event.field, event.u, event.roll, event.pitch)
-            fusion.compass(event.time, corrected)
+            if abs(math.cos(event.pitch)) > _LEAST_COS_PITCH:
+                fusion.compass(event.time, corrected)
         else:
             fused = fusion.motion(event.time, event.gyro, event.down)
             yield Heading(event.time, corrected, fused)

@@ -216,6 +216,7 @@ def _down(recording: Recording, time: FloatArray, gravity: Gravity) -> FloatArra
             f"{recording.source} must hold the vehicle's attitude (message ATTITUDE); instead it "
             "holds none"
         )
-    unwrapped = Series(recording.attitude.time, np.unwrap(recording.attitude.value, axis=0))
-    angles = interpolate(unwrapped, time)
-    return gravity_direction(angles[:, 0], angles[:, 1])
+    angles = recording.attitude.value
+    # The vector, not the angles: roll jumps by half a turn where the nose points straight up.
+    known = Series(recording.attitude.time, gravity_direction(angles[:, 0], angles[:, 1]))
+    return interpolate(known, time)
