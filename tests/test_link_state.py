@@ -396,7 +396,7 @@ class TestStreams:
     def test_a_stream_that_cannot_be_is_refused(self, rates):
         vehicle, state = FakeVehicle(), LinkState(system=1)
         play(state, [vehicle], 0.0, 2.0)
-        with pytest.raises(UsageError, match="must be one of RAW_IMU, ") as refusal:
+        with pytest.raises(UsageError, match=r"must be one of .*RAW_IMU.* above 0") as refusal:
             state.request_streams(rates, 2.0)
         assert next(iter(rates)) in str(refusal.value)
 
