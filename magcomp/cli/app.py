@@ -27,6 +27,7 @@ class _Command(NamedTuple):
 COMMANDS = {
     "fit": _Command("magcomp.cli.fit", "Find the compensation in a log, judge it, write it."),
     "check": _Command("magcomp.cli.check", "Judge the calibration in force; fit nothing."),
+    "report": _Command("magcomp.cli.report", "Fit a log and write a report to look at."),
     "demo": _Command("magcomp.cli.demo", "Fit a recorded flight whose truth is known."),
 }
 

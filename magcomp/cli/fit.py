@@ -11,36 +11,25 @@ from magcomp.cli.options import (
     check_output,
     json_option,
     log_argument,
+    method_option,
+    regressor_option,
     selection_options,
     verbose_option,
 )
 from magcomp.cli.output import answer, complain, look
 from magcomp.cli.work import fit_log, present_parameters
 from magcomp.errors import ExitCode
-from magcomp.fit import METHODS
 from magcomp.model import Analysis, Grade
 from magcomp.parameters.files import SUFFIXES, write_parameter_file
 from magcomp.report import as_json
+from magcomp.report import files as report_files
 from magcomp.session import Options, parameter_set
-from magcomp.session.analyse import REGRESSORS
 
 
 @click.command("fit")
 @log_argument
-@click.option(
-    "--method",
-    type=click.Choice(METHODS),
-    default="auto",
-    show_default=True,
-    help="How: standing still, turned at steady levels, or flown.",
-)
-@click.option(
-    "--regressor",
-    type=click.Choice(REGRESSORS),
-    default="auto",
-    show_default=True,
-    help="What the autopilot is to multiply the correction by.",
-)
+@method_option
+@regressor_option
 @selection_options
 @click.option(
     "-o",
@@ -49,12 +38,18 @@ from magcomp.session.analyse import REGRESSORS
     metavar="FILE",
     help=f"Write the parameters; the suffix chooses the form: {', '.join(SUFFIXES)}.",
 )
+@click.option(
+    "--report",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help=f"Write a report; the suffix chooses the form: {', '.join(report_files.SUFFIXES)}.",
+)
 @json_option
 @verbose_option
 @click.option(
     "--force",
     is_flag=True,
-    help="Overwrite FILE; also write a fit the judge rejects (still exit code 1).",
+    help="Overwrite; also write a fit the judge rejects (still exit code 1).",
 )
 def fit(
     log: Path,
@@ -62,6 +57,7 @@ def fit(
     regressor: str,
     selection: Selection,
     output: Path | None,
+    report: Path | None,
     to_json: bool,
     verbose: bool,
     force: bool,
@@ -74,8 +70,15 @@ def fit(
     options = Options(selection.compass, method, regressor, selection.start, selection.end)
     if output is not None:
         check_output(output, SUFFIXES, force=force)
+    if report is not None:
+        check_output(report, report_files.SUFFIXES, force=force)
     recording, analysis = fit_log(log, options, selection.system)
     written = _write(analysis, output, force=force)
+    if report is not None:
+        page = report_files.report_text(
+            report.suffix, recording, analysis, options=options, written=written
+        )
+        report_files.write_text(report, page, force=force)
     if to_json:
         answer(as_json.dumps(as_json.analysis_object(analysis, written)))
     else:

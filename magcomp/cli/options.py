@@ -13,12 +13,29 @@ from typing import TypeVar
 import click
 
 from magcomp.errors import OutputError, UsageError
+from magcomp.fit import METHODS
+from magcomp.session.analyse import REGRESSORS
 
 _Result = TypeVar("_Result")
 
 log_argument = click.argument("log", type=click.Path(path_type=Path))
 json_option = click.option("--json", "to_json", is_flag=True, help="Print one JSON object.")
 verbose_option = click.option("-v", "--verbose", is_flag=True, help="Show every detail.")
+
+method_option = click.option(
+    "--method",
+    type=click.Choice(METHODS),
+    default="auto",
+    show_default=True,
+    help="How: standing still, turned at steady levels, or flown.",
+)
+regressor_option = click.option(
+    "--regressor",
+    type=click.Choice(REGRESSORS),
+    default="auto",
+    show_default=True,
+    help="What the autopilot is to multiply the correction by.",
+)
 
 
 @dataclass(frozen=True)

@@ -189,7 +189,8 @@ def _thinned(count: int, most: int) -> IntArray:
     """Rows spread evenly over all of them."""
     if count <= most:
         return np.arange(count, dtype=np.intp)
-    return np.linspace(0, count - 1, most).astype(np.intp)
+    rows: IntArray = np.linspace(0, count - 1, most).astype(np.intp)
+    return rows
 
 
 def _sphere(corrected: FloatArray) -> IntArray:
@@ -201,7 +202,7 @@ def _sphere(corrected: FloatArray) -> IntArray:
         bins=(SPHERE_BANDS, SPHERE_SECTORS),
         range=((-1.0, 1.0), (-np.pi, np.pi)),
     )
-    return counts.astype(np.intp)
+    return np.asarray(counts, dtype=np.intp)
 
 
 def _turn(samples: Samples, corrected: FloatArray) -> tuple[IntArray, FloatArray]:
@@ -213,4 +214,4 @@ def _turn(samples: Samples, corrected: FloatArray) -> tuple[IntArray, FloatArray
         np.mod(yaw, 2 * np.pi),
         bins=(edges, np.linspace(0.0, 2 * np.pi, TURN_SECTORS + 1)),
     )
-    return counts.astype(np.intp), edges
+    return np.asarray(counts, dtype=np.intp), edges

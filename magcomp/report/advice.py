@@ -1,0 +1,86 @@
+"""What the verdict means for the pilot: a headline and the next steps, from the JSON form."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from magcomp.report import words
+
+GRADES = ("good", "marginal", "rejected")
+
+_ALONE = {
+    "good": "Good: these parameters are worth writing.",
+    "marginal": "Marginal: usable, with a doubt named below.",
+    "rejected": "Rejected: do not write these parameters.",
+}
+
+Document = Mapping[str, Any]
+
+
+def by_grade(document: Document) -> dict[str, list[int]]:
+    """Compass numbers of each grade that occurs, best grade first."""
+    found = {
+        grade: [c["compass"] for c in document["compasses"] if c["verdict"] == grade]
+        for grade in GRADES
+    }
+    return {grade: numbers for grade, numbers in found.items() if numbers}
+
+
+def headline(document: Document) -> str:
+    """The verdict in one sentence."""
+    grades = by_grade(document)
+    if len(grades) == 1:
+        return _ALONE[next(iter(grades))]
+    parts = [f"{grade} for {words.compasses(numbers)}" for grade, numbers in grades.items()]
+    return words.sentence(", ".join(parts))
+
+
+def steps(document: Document) -> tuple[str, ...]:
+    """What to do, in order."""
+    grades = by_grade(document)
+    kept = [number for grade in GRADES[:2] for number in grades.get(grade, ())]
+    if not kept:
+        return (
+            *(_doubt(c, "") for c in document["compasses"]),
+            "Mend what the verdict names, record again, and make a new report of the new log.",
+        )
+    found = [_write(document, sorted(kept))]
+    for compass in document["compasses"]:
+        if compass["verdict"] == "marginal":
+            found.append(_doubt(compass, "Until a better log says otherwise, fly with care"))
+        elif compass["verdict"] == "rejected":
+            found.append(_doubt(compass, _left(compass)))
+    found.append(
+        "Fly once more, gently, and run “magcomp check” on the new log: the heading error it "
+        "finds should be what this report promises."
+    )
+    return tuple(found)
+
+
+def _write(document: Document, kept: list[int]) -> str:
+    where = document.get("written")
+    source = document["source"]
+    how = (
+        f"they are in {where}"
+        if where
+        else f"“magcomp fit {source} -o compass.param” writes them to a file"
+    )
+    return (
+        f"Disarm, then write the parameters of {words.compasses(kept)} with your ground station; "
+        f"{how}. They belong to this vehicle only."
+    )
+
+
+def _left(compass: Mapping[str, Any]) -> str:
+    if compass["parameters"]:
+        return (
+            "It gets no correction, and its motor vector is set to zero because one switch, "
+            "COMPASS_MOTCT, serves all compasses"
+        )
+    return "It is left as it is"
+
+
+def _doubt(compass: Mapping[str, Any], then: str) -> str:
+    why = words.sentence(compass["reasons"][0]) if compass["reasons"] else ""
+    return f"Compass {compass['compass']}: {why} {words.sentence(then) if then else ''}".strip()

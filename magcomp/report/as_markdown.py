@@ -1,0 +1,126 @@
+"""An analysis as Markdown: for an issue tracker, a forum, a notebook."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from magcomp.report import advice, words
+from magcomp.report.figure import Quantity, quantity_of
+
+_SPECIAL = str.maketrans({sign: f"\\{sign}" for sign in "\\`*_{}[]<>#|"})
+
+
+def markdown(document: Mapping[str, Any], present: Mapping[str, float]) -> str:
+    """The report as Markdown.
+
+    Parameters
+    ----------
+    document
+        From :func:`magcomp.report.as_json.analysis_object`, read back from its text.
+    present
+        Parameters as the recording left them, for the difference.
+    """
+    lines = [
+        f"# {advice.headline(document)}",
+        "",
+        f"{_plain(document['source'])}, {words.duration(document['duration_s'])}, "
+        f"{_vehicle(document['vehicle'])}; magcomp {document['magcomp']}.",
+        "",
+        "## What to do",
+        "",
+        *(f"{number}. {_plain(step)}" for number, step in enumerate(advice.steps(document), 1)),
+    ]
+    for compass in document["compasses"]:
+        lines += ["", *_compass(compass, present)]
+    if document["notes"]:
+        lines += ["", "## The recording", ""]
+        lines += [f"- {_plain(words.sentence(note))}" for note in document["notes"]]
+    return "\n".join(lines) + "\n"
+
+
+def _compass(compass: Mapping[str, Any], present: Mapping[str, float]) -> Iterator[str]:
+    quantity = quantity_of(compass["regressor"])
+    yield f"## Compass {compass['compass']}: {compass['verdict']}"
+    yield ""
+    for reason in compass["reasons"]:
+        yield f"- {_plain(words.sentence(reason))}"
+    yield ""
+    yield from _table(
+        [quantity.title, "in force (°)", "fit, expected (°)", "fit, 95 % bound (°)"],
+        [
+            [
+                f"{row['u'] * quantity.scale:.0f}",
+                f"{row['before']:.1f}",
+                f"{row['after']:.2f}",
+                f"{row['p95']:.2f}",
+            ]
+            for row in compass["heading_error_deg"]
+        ],
+    )
+    yield ""
+    if compass["parameters"]:
+        yield from _table(
+            ["parameter", "in the log", "new"],
+            [
+                [f"`{name}`", _old(present, name), words.number(value)]
+                for name, value in compass["parameters"].items()
+            ],
+        )
+        yield ""
+    yield from _found(compass, quantity)
+
+
+def _old(present: Mapping[str, float], name: str) -> str:
+    return words.number(present[name]) if name in present else "not in the log"
+
+
+def _found(compass: Mapping[str, Any], quantity: Quantity) -> Iterator[str]:
+    residual, coverage = compass["field_residual_mgauss"], compass["coverage"]
+    parts = ", ".join(
+        words.with_std(value, std)
+        for value, std in zip(compass["interference_mgauss"], compass["std_mgauss"], strict=True)
+    )
+    per = "per A" if quantity.scale == 1.0 else "at full throttle"
+    yield f"- Interference: {parts} mGauss {per}"
+    for which, name in (
+        ("field", "Field behind attitude"),
+        ("regressor", f"{quantity.name.capitalize()} against field"),
+    ):
+        value, std = compass["lag_s"][which], compass["lag_std_s"][which]
+        if value is not None:
+            doubt = "" if std is None else f" ± {1000 * std:.0f}"
+            yield f"- {name}: {1000 * value:.0f}{doubt} ms"
+    yield (
+        f"- Unexplained field: {residual['before']:.1f} mGauss in force, {residual['after']:.1f} "
+        f"with the fit; on data the fit did not see {residual['held_out_before']:.1f} and "
+        f"{residual['held_out']:.1f}"
+    )
+    yield (
+        f"- Covered: {coverage['u_low'] * quantity.scale:.0f} to "
+        f"{coverage['u_high'] * quantity.scale:.0f} {quantity.unit}, "
+        f"{coverage['heading'] * 100:.0f} % of a turn, {coverage['sphere'] * 100:.0f} % of the "
+        f"sphere, tilt up to {coverage['tilt_deg']:.0f}°, {coverage['seconds']:.0f} s"
+    )
+    yield (
+        f"- Method: {compass['method']}, because {_plain(compass['why'])}; {quantity.name} from "
+        f"{_plain(compass['origin'])}; {compass['count']} readings"
+    )
+
+
+def _vehicle(vehicle: Mapping[str, Any]) -> str:
+    ids = ", ".join(map(str, vehicle["device_ids"])) or "not in the log"
+    kind = " ".join(filter(None, (vehicle["autopilot"], vehicle["kind"], vehicle["firmware"])))
+    return f"{_plain(kind)}, system {vehicle['system']}, compass device ids {ids}"
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    yield f"| {' | '.join(head)} |"
+    yield "|---|" + "---:|" * (len(head) - 1)
+    for row in rows:
+        yield f"| {' | '.join(row)} |"
+
+
+def _plain(text: str) -> str:
+    """Text without meaning to Markdown."""
+    return text.translate(_SPECIAL)

@@ -1,0 +1,183 @@
+"""The paper's Figs 3 and 4 in space: the field's cloud, its ellipsoids, the line of centres."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from magcomp.model import CompassResult, FloatArray, Level, MotorFit
+from magcomp.report.evidence import CompassPlots
+from magcomp.report.figure import GRID, INK, SCALE, Figure, Quantity, Trace, rounded
+
+_MOST_ELLIPSOIDS = 5
+_FLIGHT_ELLIPSOIDS = 2
+
+
+def cloud(result: CompassResult, plots: CompassPlots, quantity: Quantity) -> Figure:
+    """Raw field in space with the ellipsoids of the levels and the line through their centres.
+
+    Where the vehicle stood still there is no ellipsoid: the readings less the earth's part are
+    drawn about the line itself.
+    """
+    fit = result.fit
+    still = fit.method == "sweep"
+    raw = plots.raw
+    if still:
+        centres = np.array([fit.correction.centre(float(u)) for u in plots.u])
+        raw = raw - np.median(raw - centres, axis=0)
+    levels = () if still else _drawn(fit)
+    top = float(quantity.scale * max(plots.u.max(), max((lv.u for lv in fit.levels), default=0.0)))
+    shades = {"colorscale": SCALE, "cmin": 0.0, "cmax": top}
+    data = [
+        _points(raw, quantity.values(plots.u, 1), quantity, shades),
+        *(_ellipsoid(fit, level, quantity, shades) for level in levels),
+        *_line_of_centres(fit, quantity),
+    ]
+    return Figure(
+        "cloud",
+        "The field in space",
+        _caption(fit, quantity, len(levels)),
+        data,
+        _layout(),
+        height=520,
+        wide=True,
+    )
+
+
+def _drawn(fit: MotorFit) -> tuple[Level, ...]:
+    """The levels that get an ellipsoid: all of a turntable's, the outermost of a flight's."""
+    if not fit.levels:
+        return ()
+    most = _MOST_ELLIPSOIDS if fit.method == "levels" else _FLIGHT_ELLIPSOIDS
+    chosen = np.unique(np.linspace(0, len(fit.levels) - 1, most).round().astype(int))
+    return tuple(fit.levels[k] for k in chosen)
+
+
+def _caption(fit: MotorFit, quantity: Quantity, ellipsoids: int) -> str:
+    if fit.method == "sweep":
+        return (
+            "The vehicle stood still, so there is no ellipsoid to see: the readings, less the "
+            f"earth's field, move along the line of centres as the {quantity.name} grows (drag to "
+            "turn)."
+        )
+    length = 0.0 if fit.line is None else float(np.ptp(fit.line.positions))
+    return (
+        f"Every reading lies on an ellipsoid whose centre moves as the {quantity.name} grows: "
+        f"{ellipsoids} ellipsoids are drawn, and their centres lie on a line {length:.0f} mGauss "
+        "long (drag to turn)."
+    )
+
+
+def _points(raw: FloatArray, u: list[float], quantity: Quantity, shades: dict[str, Any]) -> Trace:
+    bar = {
+        "title": {"text": quantity.title, "side": "right"},
+        "thickness": 8,
+        "len": 0.6,
+        "outlinewidth": 0,
+    }
+    x, y, z = rounded(raw.T, 1)
+    return {
+        "type": "scatter3d",
+        "mode": "markers",
+        "name": "readings",
+        "x": x,
+        "y": y,
+        "z": z,
+        "marker": {"size": 2, "opacity": 0.7, "color": u, "colorbar": bar, **shades},
+        "text": [f"{value:g} {quantity.unit}" for value in u],
+        "hovertemplate": "%{text}: %{x:.0f}, %{y:.0f}, %{z:.0f} mGauss<extra></extra>",
+    }
+
+
+def _ellipsoid(fit: MotorFit, level: Level, quantity: Quantity, shades: dict[str, Any]) -> Trace:
+    """Wires of |D · (raw − centre)| = F, PAPER.md 5 and 6."""
+    sphere = _wires()
+    surface = level.centre + fit.strength * np.linalg.solve(fit.correction.soft_iron, sphere.T).T
+    x, y, z = ([None if np.isnan(v) else v for v in row] for row in rounded(surface.T, 1))
+    shown = float(quantity.scale * level.u)
+    return {
+        "type": "scatter3d",
+        "mode": "lines",
+        "name": f"ellipsoid at {quantity.text(level.u)}",
+        "x": x,
+        "y": y,
+        "z": z,
+        "line": {"color": [shown] * len(x), "width": 1.5, **shades},
+        "opacity": 0.55,
+        "hoverinfo": "name",
+    }
+
+
+def _wires() -> FloatArray:
+    """Circles of a unit sphere, with rows of NaN between them, shape (n, 3)."""
+    angle = np.linspace(0.0, 2 * np.pi, 49)
+    gap = np.full((1, 3), np.nan)
+    circles = []
+    for height in np.radians([-60.0, -30.0, 0.0, 30.0, 60.0]):
+        ring = [np.cos(height) * np.cos(angle), np.cos(height) * np.sin(angle)]
+        circles += [np.column_stack([*ring, np.full_like(angle, np.sin(height))]), gap]
+    for turned in np.radians([0.0, 45.0, 90.0, 135.0]):
+        ring = [np.cos(angle) * np.cos(turned), np.cos(angle) * np.sin(turned)]
+        circles += [np.column_stack([*ring, np.sin(angle)]), gap]
+    return np.vstack(circles)
+
+
+def _line_of_centres(fit: MotorFit, quantity: Quantity) -> list[Trace]:
+    if fit.line is None or not fit.levels:
+        return []
+    ends = np.array([fit.line.positions.min(), fit.line.positions.max()])
+    reach = np.array([[ends[0]], [ends[1]]]) * fit.line.direction + fit.line.point
+    lx, ly, lz = rounded(reach.T, 2)
+    cx, cy, cz = rounded(np.array([level.centre for level in fit.levels]).T, 2)
+    text = [f"centre at {quantity.text(level.u)}" for level in fit.levels]
+    return [
+        {
+            "type": "scatter3d",
+            "mode": "lines",
+            "name": "line of centres",
+            "x": lx,
+            "y": ly,
+            "z": lz,
+            "line": {"color": INK, "width": 5},
+            "hoverinfo": "name",
+        },
+        {
+            "type": "scatter3d",
+            "mode": "markers",
+            "name": "centres",
+            "x": cx,
+            "y": cy,
+            "z": cz,
+            "marker": {"color": INK, "size": 4, "symbol": "diamond"},
+            "text": text,
+            "hovertemplate": "%{text}: %{x:.1f}, %{y:.1f}, %{z:.1f} mGauss<extra></extra>",
+        },
+    ]
+
+
+def _layout() -> dict[str, Any]:
+    def side(title: str) -> dict[str, Any]:
+        return {
+            "title": {"text": title},
+            "gridcolor": GRID,
+            "zerolinecolor": GRID,
+            "linecolor": GRID,
+            "showbackground": False,
+            "nticks": 5,
+        }
+
+    return {
+        "scene": {
+            "xaxis": side("x forward (mGauss)"),
+            # Down is drawn downwards, as the vehicle stands; reversing y too keeps the picture from
+            # being a mirror image.
+            "yaxis": {**side("y right (mGauss)"), "autorange": "reversed"},
+            "zaxis": {**side("z down (mGauss)"), "autorange": "reversed"},
+            "aspectmode": "data",
+            "camera": {"eye": {"x": 1.35, "y": -1.35, "z": 0.7}},
+        },
+        "showlegend": True,
+        "legend": {"orientation": "h", "x": 0, "y": 1.02, "yanchor": "bottom", "xanchor": "left"},
+        "margin": {"l": 0, "r": 0, "t": 30, "b": 0},
+    }

@@ -1,0 +1,228 @@
+"""The tables of the page; every number of a result comes from the JSON form."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from datetime import UTC, datetime
+
+from magcomp.model import Recording
+from magcomp.report import words
+from magcomp.report.evidence import CompassPlots
+from magcomp.report.figure import Quantity, quantity_of
+from magcomp.report.html_parts import DASH, Numbers, badge, facts, minus, table, text
+
+
+def overview(numbers: Numbers) -> str:
+    """A card a compass: verdict, heading error before and after, unexplained field."""
+    cards = []
+    for index, compass in enumerate(numbers.at("compasses")):
+        quantity = quantity_of(compass["regressor"])
+        row = _covered_row(compass)
+        key = ("compasses", index, "heading_error_deg", row)
+        u = numbers.show(*key, "u", decimals=0, scale=quantity.scale)
+        before, bound = (numbers.show(*key, name, decimals=1) for name in ("before", "p95"))
+        residual = ("compasses", index, "field_residual_mgauss")
+        was, left = (
+            numbers.show(*residual, name, decimals=1) for name in ("held_out_before", "held_out")
+        )
+        cards.append(
+            f'<article class="card {compass["verdict"]}"><h3>Compass {compass["compass"]}'
+            f"{badge(compass['verdict'])}</h3>"
+            f'<p class="figure"><span class="was">{before}°</span>'
+            f'<span class="arrow" aria-label="falls to at most">→</span>'
+            f'<span class="now">≤ {bound}°</span></p>'
+            f"<p>heading error at {u} {quantity.unit} {quantity.name}, now and with the fit "
+            f"(95 % bound)</p>"
+            f"<p>unexplained field on data the fit did not see: {was} → {left} mGauss</p></article>"
+        )
+    return f'<div class="cards">{"".join(cards)}</div>'
+
+
+def _covered_row(compass: Mapping[str, object]) -> int:
+    """The row of the table next to the largest control quantity the log covers."""
+    rows, coverage = compass["heading_error_deg"], compass["coverage"]
+    if not isinstance(rows, list) or not isinstance(coverage, dict):
+        return 0
+    return min(range(len(rows)), key=lambda k: abs(rows[k]["u"] - coverage["u_high"]))
+
+
+def heading_errors(numbers: Numbers, index: int, quantity: Quantity) -> str:
+    """Heading error by control quantity."""
+    key = ("compasses", index, "heading_error_deg")
+    rows = []
+    for row in range(len(numbers.at(*key))):
+        u = numbers.show(*key, row, "u", decimals=0, scale=quantity.scale)
+        rows.append(
+            [
+                f"{u} {quantity.unit}",
+                *(
+                    f"{numbers.show(*key, row, name, decimals=digits)}°"
+                    for name, digits in (("before", 1), ("after", 2), ("p95", 2))
+                ),
+            ]
+        )
+    return table(
+        [text(quantity.name.capitalize()), "In force", "Fit, expected", "Fit, 95 % bound"],
+        rows,
+        "Largest heading error over a full turn, level and tilted 20°",
+        "numbers",
+    )
+
+
+def parameters(numbers: Numbers, index: int, present: Mapping[str, float]) -> str:
+    """The parameters of one compass, old and new; what does not change is folded away."""
+    key = ("compasses", index, "parameters")
+    changed, same = [], []
+    for name, value in numbers.at(*key).items():
+        old = present.get(name)
+        shown = minus(words.number(old)) if old is not None else "not in the log"
+        row = [f"<code>{text(name)}</code>", shown, numbers.show(*key, name)]
+        if old is not None and old == value:
+            same.append(row)
+        else:
+            changed.append(row)
+    head = ["Parameter", "In the log", "New"]
+    if not changed and not same:
+        return "<p>Nothing would be written for this compass.</p>"
+    page = (
+        table(head, changed, "Parameters that change", "numbers parameters")
+        if changed
+        else "<p>The vehicle holds these values already.</p>"
+    )
+    if same:
+        page += (
+            f"<details><summary>{len(same)} parameters stay as they are</summary>"
+            + table(head, same, "Parameters that stay", "numbers parameters")
+            + "</details>"
+        )
+    return page
+
+
+def findings(numbers: Numbers, index: int, quantity: Quantity) -> str:
+    """Interference, lags, coverage and how the answer was found."""
+    compass = ("compasses", index)
+    per = "mGauss per A" if quantity.scale == 1.0 else "mGauss at full throttle"
+    pairs = [
+        (
+            f"Interference, {per}",
+            f"{numbers.vector(*compass, 'interference_mgauss')} "
+            f"<small>± {numbers.vector(*compass, 'std_mgauss')}</small>",
+        ),
+        ("Field behind attitude", _lag(numbers, index, "field")),
+        (f"{quantity.name.capitalize()} against field", _lag(numbers, index, "regressor")),
+        ("Unexplained field, in force", _residual(numbers, index, "before")),
+        ("Unexplained field, fit", _residual(numbers, index, "after")),
+        (
+            "The same on unseen data",
+            f"{_residual(numbers, index, 'held_out_before')} → "
+            f"{_residual(numbers, index, 'held_out')}",
+        ),
+        ("Straightness of the line", _straightness(numbers, index)),
+        (
+            "Earth’s field",
+            f"{numbers.show(*compass, 'earth_mgauss', 'strength', decimals=0)} mGauss, "
+            f"{numbers.show(*compass, 'earth_mgauss', 'vertical', decimals=0)} of it downwards",
+        ),
+    ]
+    return facts(pairs)
+
+
+def _lag(numbers: Numbers, index: int, which: str) -> str:
+    key = ("compasses", index)
+    value = numbers.show(*key, "lag_s", which, decimals=0, scale=1000.0)
+    if value == DASH:
+        return "not visible to this method"
+    std = numbers.show(*key, "lag_std_s", which, decimals=0, scale=1000.0)
+    return f"{value} ms <small>± {std}</small>"
+
+
+def _residual(numbers: Numbers, index: int, which: str) -> str:
+    return numbers.show("compasses", index, "field_residual_mgauss", which, decimals=1) + " mGauss"
+
+
+def _straightness(numbers: Numbers, index: int) -> str:
+    key = ("compasses", index, "line")
+    if numbers.at(*key) is None:
+        return DASH
+    return (
+        f"{numbers.show(*key, 'straightness', decimals=4)} "
+        f"<small>({numbers.show(*key, 'rms_mgauss', decimals=1)} mGauss off it)</small>"
+    )
+
+
+def coverage(numbers: Numbers, index: int, plots: CompassPlots, quantity: Quantity) -> str:
+    """What the data cover, and of what quality they are."""
+    key = ("compasses", index, "coverage")
+    low, high = (
+        numbers.show(*key, name, decimals=0, scale=quantity.scale) for name in ("u_low", "u_high")
+    )
+    pairs = [
+        (quantity.name.capitalize(), f"{low} to {high} {quantity.unit}"),
+        ("Headings", f"{numbers.show(*key, 'heading', decimals=0, scale=100.0)} % of a turn"),
+        ("Directions", f"{numbers.show(*key, 'sphere', decimals=0, scale=100.0)} % of the sphere"),
+        ("Largest tilt", f"{numbers.show(*key, 'tilt_deg', decimals=0)}°"),
+        ("Time in use", f"{numbers.show(*key, 'seconds', decimals=0)} s"),
+        (
+            "New readings",
+            f"{plots.count} of {plots.reported_count} messages"
+            + (f", {plots.rate_hz:.1f} a second" if plots.count > 1 else ""),
+        ),
+        (
+            "Longest gap",
+            f"{plots.longest_gap_s:.1f} s" if plots.count > 1 else DASH,
+        ),
+    ]
+    return facts(pairs)
+
+
+def vehicle(numbers: Numbers, recording: Recording) -> str:
+    """Who flew, and what the recording holds."""
+    of = recording.vehicle
+    pairs = [
+        ("Vehicle", text(words.vehicle(of))),
+        ("Board", text(of.board) or "not named in the log"),
+        ("Compass device ids", ", ".join(map(str, of.device_ids)) or "not in the log"),
+        ("Recorded", _date(recording.start_unix_s)),
+        ("Length", f"{numbers.show('duration_s', decimals=0)} s"),
+        ("Log", text(numbers.at("source"))),
+    ]
+    return facts(pairs)
+
+
+def _date(unix_s: float) -> str:
+    try:
+        return datetime.fromtimestamp(unix_s, UTC).strftime("%Y-%m-%d %H:%M UTC")
+    except (OverflowError, OSError, ValueError):
+        return "unknown"
+
+
+def quality(recording: Recording) -> str:
+    """What the reader made of the bytes, and how often each quantity came."""
+    report = recording.report
+    others = ", ".join(f"{system}:{component}" for system, component in report.others)
+    pairs = [
+        ("Size", f"{report.size / 1e6:.1f} MB"),
+        ("Messages", f"{report.used} used of {report.frames}"),
+        ("Damaged messages", str(report.bad_checksum)),
+        ("Bytes of no message", str(report.skipped)),
+        ("Repeated messages", str(report.duplicates)),
+        ("Other systems left out", text(others) or "none"),
+        *_rates(recording),
+    ]
+    return facts(pairs)
+
+
+def _rates(recording: Recording) -> Iterator[tuple[str, str]]:
+    series = {
+        "Attitude": recording.attitude,
+        "Current": recording.current,
+        "Throttle": recording.throttle,
+        "Motor outputs": recording.outputs,
+    }
+    for name, of in series.items():
+        if of is None or len(of) < 2:
+            yield name, "none in the log"
+        else:
+            span = float(of.time[-1] - of.time[0])
+            rate = f"{(len(of) - 1) / span:.1f} a second" if span > 0 else DASH
+            yield name, rate
