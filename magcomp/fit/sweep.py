@@ -10,7 +10,6 @@ from magcomp.fit.flight import (
     LAG_MEAN_S,
     LAG_MOST_S,
     LAG_WIDTH_S,
-    TRUSTED_OFFSET_MGAUSS,
     TRUSTED_SOFT_IRON,
     Problem,
 )
@@ -20,8 +19,6 @@ from magcomp.fit.steady import steady_levels
 from magcomp.model import (
     CORRECTION_SIZE,
     MOTOR,
-    OFFSET,
-    SOFT_IRON,
     Correction,
     FloatArray,
     Lags,
@@ -121,14 +118,15 @@ def _answer(
     full = np.zeros((CORRECTION_SIZE, CORRECTION_SIZE))
     doubt = TRUSTED_SOFT_IRON**2 * float(slope @ slope) * np.eye(3)
     full[MOTOR, MOTOR] = shape @ covariance[_SLOPE, _SLOPE] @ shape.T + doubt
-    full[OFFSET, OFFSET] = TRUSTED_OFFSET_MGAUSS**2 * np.eye(3)
-    full[SOFT_IRON, SOFT_IRON] = TRUSTED_SOFT_IRON**2 * np.eye(6)
     corrected = correction.apply(samples.raw, samples.u)
     levels = _levels(problem, samples, parameters, present, noise)
     return MotorFit(
         compass=samples.compass,
         method="sweep",
-        why=f"the vehicle stood still while the {problem.control.kind} changed",
+        why=(
+            f"the vehicle stood still while the {problem.control.kind} changed; offsets and soft "
+            "iron are taken as they are"
+        ),
         regressor=problem.control.kind,
         origin=problem.control.origin,
         correction=correction,
