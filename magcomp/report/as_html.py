@@ -6,7 +6,6 @@ import base64
 import json
 import platform
 from collections.abc import Mapping, Sequence
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
@@ -18,10 +17,9 @@ from magcomp.report import advice, as_json, html_tables, words
 from magcomp.report.evidence import CompassPlots, compass_plots
 from magcomp.report.figure import Figure, quantity_of
 from magcomp.report.figures import figures
+from magcomp.report.html_page import ASSETS, canvas, page
 from magcomp.report.html_parts import Numbers, badge, sign, text
 from magcomp.session import Options, parameter_set
-
-_ASSETS = files("magcomp.report") / "assets"
 
 _METHODS = {
     "sweep": "sweep (the vehicle stood still while the motors worked)",
@@ -152,14 +150,7 @@ def _panel(
 
 
 def _figure(figure: Figure, compass: int) -> str:
-    name = f"{figure.name}-{compass}"
-    wide = " wide" if figure.wide else ""
-    return (
-        f'<figure class="plot{wide}"><h4>{text(figure.title)}</h4>'
-        f'<div class="canvas" id="{name}" style="height:{figure.height}px" role="img" '
-        f'aria-label="{text(figure.title)}: {text(figure.caption)}"></div>'
-        f"<figcaption>{text(figure.caption)}</figcaption></figure>"
-    )
+    return canvas(f"{figure.name}-{compass}", figure)
 
 
 def _notes(notes: Sequence[str]) -> str:
@@ -171,7 +162,7 @@ def _notes(notes: Sequence[str]) -> str:
 
 def _computed() -> str:
     versions = f"magcomp {__version__}, numpy {np.__version__}, Python {platform.python_version()}"
-    content = (_ASSETS / "computed.html").read_text(encoding="utf-8")
+    content = (ASSETS / "computed.html").read_text(encoding="utf-8")
     return (
         f"<details><summary>How this was computed</summary>{content}"
         f"<p>Made by {text(versions)}.</p></details></main>"
@@ -179,32 +170,12 @@ def _computed() -> str:
 
 
 def _page(title: str, body: str, source: str, drawn: Sequence[Sequence[Figure]]) -> str:
-    # plotly is only a carrier of its script here, and slow to import.
-    from plotly.offline import get_plotlyjs  # noqa: PLC0415
-
-    style, script = (
-        (_ASSETS / name).read_text(encoding="utf-8") for name in ("report.css", "report.js")
-    )
     pictures = {
-        f"{figure.name}-{index}": {"data": figure.data, "layout": figure.layout}
+        f"{figure.name}-{index}": figure
         for index, of in _numbered(json.loads(source), drawn)
         for figure in of
     }
-    return (
-        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
-        # The page must work offline, so the browser is told to refuse everything from elsewhere.
-        '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; '
-        "style-src 'unsafe-inline'; script-src 'unsafe-inline' 'unsafe-eval'; "
-        'img-src data: blob:">'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        '<meta name="color-scheme" content="light dark">'
-        f"<title>{text(title)}</title><style>{style}</style></head>"
-        f'<body>{body}<noscript><p class="note">The pictures need JavaScript; every number is in '
-        "the tables.</p></noscript>"
-        f'<script type="application/json" id="result">{_inert(source)}</script>'
-        f'<script type="application/json" id="figures">{_inert(_compact(pictures))}</script>'
-        f"<script>{get_plotlyjs()}</script><script>{script}</script></body></html>\n"
-    )
+    return page(title, body, source, pictures)
 
 
 def _numbered(
@@ -212,12 +183,3 @@ def _numbered(
 ) -> list[tuple[int, Sequence[Figure]]]:
     numbers = [compass["compass"] for compass in document["compasses"]]
     return list(zip(numbers, drawn, strict=True))
-
-
-def _compact(pictures: Mapping[str, Any]) -> str:
-    return json.dumps(pictures, separators=(",", ":"), allow_nan=False)
-
-
-def _inert(content: str) -> str:
-    """JSON that cannot end the script element it stands in."""
-    return content.replace("<", "\\u003c")

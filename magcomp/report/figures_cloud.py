@@ -39,7 +39,7 @@ def cloud(result: CompassResult, plots: CompassPlots, quantity: Quantity) -> Fig
         "The field in space",
         _caption(fit, quantity, len(levels)),
         data,
-        _layout(),
+        space(),
         height=520,
         wide=True,
     )
@@ -92,7 +92,7 @@ def _points(raw: FloatArray, u: list[float], quantity: Quantity, shades: dict[st
 
 def _ellipsoid(fit: MotorFit, level: Level, quantity: Quantity, shades: dict[str, Any]) -> Trace:
     """Wires of |D · (raw − centre)| = F, PAPER.md 5 and 6."""
-    sphere = _wires()
+    sphere = wires()
     surface = level.centre + fit.strength * np.linalg.solve(fit.correction.soft_iron, sphere.T).T
     x, y, z = ([None if np.isnan(v) else v for v in row] for row in rounded(surface.T, 1))
     shown = float(quantity.scale * level.u)
@@ -109,7 +109,7 @@ def _ellipsoid(fit: MotorFit, level: Level, quantity: Quantity, shades: dict[str
     }
 
 
-def _wires() -> FloatArray:
+def wires() -> FloatArray:
     """Circles of a unit sphere, with rows of NaN between them, shape (n, 3)."""
     angle = np.linspace(0.0, 2 * np.pi, 49)
     gap = np.full((1, 3), np.nan)
@@ -156,7 +156,9 @@ def _line_of_centres(fit: MotorFit, quantity: Quantity) -> list[Trace]:
     ]
 
 
-def _layout() -> dict[str, Any]:
+def space() -> dict[str, Any]:
+    """Layout of a picture in space, in body axes."""
+
     def side(title: str) -> dict[str, Any]:
         return {
             "title": {"text": title},
