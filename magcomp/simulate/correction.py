@@ -14,6 +14,8 @@ from magcomp.simulate.truth import MOTORS
 
 FloatArray = NDArray[np.float64]
 
+_STEEPEST = 2.0
+
 
 class Correction:
     """Corrects readings; reads the parameters again whenever one of them has changed.
@@ -72,7 +74,7 @@ class Correction:
         """COMPASS_PMOT_*: each motor has a vector of its own, and COMPASS_MOT is not used."""
         off = {**self._store.values, "COMPASS_MOTCT": 0.0}
         vectors = motor_vectors(self._store.values)
-        exponent = self._store["COMPASS_PMOT_EXP"]
+        exponent = min(max(self._store["COMPASS_PMOT_EXP"], 0.0), _STEEPEST)
         plain = ardupilot.correct(raw, 0.0, ardupilot.calibration(off, 1))
         return np.asarray(plain + np.maximum(drive, 0.0) ** exponent @ vectors)
 

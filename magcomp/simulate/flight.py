@@ -75,7 +75,7 @@ class Flight:
         self._duration = duration_s
         self._north = Waves(rng, 22.0, 60.0, 12.0)
         self._east = Waves(rng, 22.0, 60.0, 12.0)
-        self._height = Waves(rng, 6.0, 30.0, 7.0)
+        self._height = Waves(rng, 4.5, 20.0, 4.5)
         self._yaw = Waves(rng, 2.4, 45.0, 14.0)
         self._yaw_start = rng.uniform(-np.pi, np.pi)
         self._wind = [Waves(rng, 2.0, 30.0, 1.5) for _ in range(2)]

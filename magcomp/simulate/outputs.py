@@ -9,6 +9,10 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
+_LONGEST_US = 2500.0
+_STRAIGHT = 1e-6
+_LEAST_RATIO = 0.1
+
 
 def motor_outputs(
     thrust: FloatArray,
@@ -43,23 +47,24 @@ def motor_outputs(
         return np.full_like(thrust, low)
     volts = _voltage_ratio(voltage, parameters)
     wanted = np.clip(thrust / _air_density(altitude_m), 0.0, 1.0)
-    expo = parameters["MOT_THST_EXPO"]
+    expo = min(max(parameters["MOT_THST_EXPO"], -1.0), 1.0)
     lift = volts * (1 - expo) + expo * volts**2
-    if expo == 0.0:
+    if abs(expo) < _STRAIGHT:
         ratio = lift * wanted
     else:
-        ratio = (expo - 1 + np.sqrt((1 - expo) ** 2 + 4 * expo * lift * wanted)) / (2 * expo)
+        root = np.sqrt(np.maximum((1 - expo) ** 2 + 4 * expo * lift * wanted, 0.0))
+        ratio = (expo - 1 + root) / (2 * expo)
     least, most = parameters["MOT_SPIN_MIN"], parameters["MOT_SPIN_MAX"]
     actuator = least + (most - least) * np.clip(ratio / volts, 0.0, 1.0)
     actuator = np.where(thrust > 0.0, actuator, parameters["MOT_SPIN_ARM"])
-    return np.asarray(low + (high - low) * actuator)
+    return np.asarray(np.clip(low + (high - low) * actuator, 0.0, _LONGEST_US))
 
 
 def _voltage_ratio(voltage: float, parameters: Mapping[str, float]) -> float:
     most, least = parameters["MOT_BAT_VOLT_MAX"], parameters["MOT_BAT_VOLT_MIN"]
     if most <= 0.0 or least >= most:
         return 1.0
-    return min(max(voltage, least), most) / most
+    return min(max(voltage, least, _LEAST_RATIO * most), most) / most
 
 
 def _air_density(altitude_m: float) -> float:

@@ -196,7 +196,7 @@ class Vehicle:
             self._tick += 1
             if step == physics.STEPS - 1:
                 self._read_sensors()
-            if self._tick >= self._boot_tick:
+            if self._tick > self._boot_tick:
                 self._speak(step)
 
     def _start_block(self) -> None:

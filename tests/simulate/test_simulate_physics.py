@@ -135,7 +135,7 @@ def test_in_flight_the_interference_is_nearly_but_not_exactly_proportional():
         share = np.multiply.outer(with_motors.current, chosen.truth.interference)
         off.append(with_motors.field - without.field - share)
         size.append(share)
-    assert 0.5 < np.std(off) < 0.1 * np.linalg.norm(size, axis=-1).max()
+    assert 0.05 < np.std(off) < 0.02 * np.linalg.norm(size, axis=-1).max()
 
 
 def test_the_papers_control_quantities_draw_the_papers_currents():

@@ -12,7 +12,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from magcomp.simulate import Vehicle, scenario
 from magcomp.simulate.framing import Splitter, message_id
-from magcomp.simulate.ground import Asker
+from magcomp.simulate.ground import DEFAULT_RATES, Asker
 
 ACCEPTED, DENIED, UNSUPPORTED, FAILED = 0, 2, 3, 4
 RAW_IMU = mavlink.MAVLINK_MSG_ID_RAW_IMU
@@ -375,6 +375,21 @@ class TestWhatIsNotMavlink:
         for frame in Splitter().push(junk + bytes(damaged)):
             vehicle.receive(frame, 0.0)
         assert vehicle.parameters["COMPASS_MOT_X"] == 0.0
+
+    @settings(max_examples=200, deadline=None)
+    @given(data=st.data())
+    def test_no_parameter_value_brings_it_down(self, data):
+        vehicle, asker = Vehicle(scenario("sweep", 1)), Asker()
+        relevant = [n for n in vehicle.parameters if n.startswith(("COMPASS", "MOT_", "BATT"))]
+        for name in data.draw(st.lists(st.sampled_from(relevant), min_size=1, max_size=6)):
+            value = data.draw(st.floats(width=32))
+            message = mavlink.MAVLink_param_set_message(1, 1, name.encode(), value, 9)
+            vehicle.receive(asker.pack(message), 0.0)
+        for number in DEFAULT_RATES:
+            vehicle.receive(asker.rate(number, 10.0), 0.0)
+        vehicle.receive(asker.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1, FORCE), 0.0)
+        assert vehicle.armed
+        assert len(vehicle.advance(0.5)) > 20
 
     @given(st.lists(st.integers(1, 40), min_size=1), st.binary(max_size=20))
     def test_frames_survive_any_cutting_of_the_stream(self, cuts, junk):

@@ -13,6 +13,7 @@ from pymavlink import mavutil
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from magcomp.errors import OutputError
+from magcomp.log import read
 from magcomp.simulate import Truth, Vehicle, record, scenario, write_tlog
 from magcomp.simulate.ground import DEFAULT_RATES
 from magcomp.simulate.outputs import motor_outputs
@@ -199,3 +200,26 @@ def test_the_thrust_curve_is_the_real_firmwares(recording):
             parameters=curve,
         )
         assert low - 1.0 <= output <= high + 1.0
+
+
+def test_the_log_reader_finds_everything_a_fit_needs(tmp_path):
+    truth = write_tlog(tmp_path / "flight.tlog", program="sweep", seed=11)
+    recording = read(tmp_path / "flight.tlog")
+    assert recording.vehicle.device_ids == (97539, 131874, 263178)
+    assert (recording.vehicle.kind, recording.vehicle.firmware) == ("copter", "4.6.3")
+    assert recording.start_unix_s == 1_750_000_000.0
+    assert (recording.report.bad_checksum, recording.report.skipped) == (0, 0)
+    assert recording.field.keys() == {1, 2, 3}
+    for series in (
+        recording.attitude,
+        recording.gyro,
+        recording.accel,
+        recording.throttle,
+        recording.current,
+        recording.voltage,
+        recording.outputs,
+        recording.armed,
+    ):
+        assert series is not None
+        assert len(series) > 60
+    np.testing.assert_allclose(recording.position.value[0], truth.home, atol=1e-6)
