@@ -79,7 +79,13 @@ def fit(problem: Problem, method: str = "auto") -> MotorFit:
             f"readings; instead it has {len(problem.readings)}"
         )
     samples = problem.sample(Lags())
-    if method == "sweep" or (method == "auto" and is_still(samples)):
+    still = is_still(samples)
+    if method == "sweep" and not still:
+        raise FitRejectedError(
+            "The method of sweeps needs the vehicle to stand still while the "
+            f"{problem.control.kind} changes; instead it moved"
+        )
+    if method in ("auto", "sweep") and still:
         return fit_sweep(problem)
     if method in ("auto", "levels"):
         rows, level = usable_levels(problem)

@@ -46,7 +46,7 @@ class SpaceLine:
         return np.asarray(np.linalg.norm(centres - feet, axis=1))
 
 
-def paper_line(centres: FloatArray, *, threshold: float = 1e-9, most: int = 1000) -> SpaceLine:
+def paper_line(centres: FloatArray, *, threshold: float = 1e-9, most: int = 20_000) -> SpaceLine:
     """The paper's total least squares line x = a·z + b, y = c·z + d.
 
     Parameters
@@ -56,7 +56,7 @@ def paper_line(centres: FloatArray, *, threshold: float = 1e-9, most: int = 1000
     threshold
         The iteration ends when no element of ξ = [a, b, c, d] changes by more.
     most
-        Iterations allowed.
+        Iterations allowed; it creeps: thousands are needed for centres a few noise widths apart.
 
     Raises
     ------

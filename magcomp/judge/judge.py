@@ -194,8 +194,9 @@ def _on_shape(
     fit: MotorFit, residual: FieldResidual, covered: Coverage, limits: Thresholds
 ) -> Iterator[_Finding]:
     if fit.method == "flight" and covered.heading < limits.heading:
+        enough = covered.heading >= limits.least_heading
         yield _Finding(
-            Grade.MARGINAL,
+            Grade.MARGINAL if enough else Grade.REJECTED,
             f"the vehicle faced only {covered.heading * 100:.0f} % of a full turn: "
             "turn slowly all the way round",
         )

@@ -18,9 +18,11 @@ class Thresholds:
         larger than its own uncertainty.
     least_current_a, least_throttle
         Range the control quantity must cover.
-    heading, bends
-        Share of a full turn that must be seen in flight, and the distance of the centres from
-        their line, as a share of its length, beyond which the line is not one.
+    heading, least_heading
+        Share of a full turn that should, and that must, be seen in flight.
+    bends
+        Distance of the centres from their line, as a share of its length, beyond which the line
+        is not one.
     noise_share, worthwhile
         Unexplained field after the fit, as a share of the field's strength, beyond which
         something else than the motors disturbs the compass; the correction is then only worth
@@ -36,6 +38,7 @@ class Thresholds:
     least_current_a: float = 5.0
     least_throttle: float = 0.12
     heading: float = 0.6
+    least_heading: float = 0.25
     bends: float = 0.15
     noise_share: float = 0.04
     worthwhile: float = 0.25
