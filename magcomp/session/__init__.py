@@ -2,5 +2,6 @@
 
 from magcomp.session.analyse import Options, analyse, check, regressor_in_force
 from magcomp.session.emit import parameter_set
+from magcomp.session.refresh import refresh
 
-__all__ = ["Options", "analyse", "check", "parameter_set", "regressor_in_force"]
+__all__ = ["Options", "analyse", "check", "parameter_set", "refresh", "regressor_in_force"]

@@ -105,7 +105,7 @@ def analyse(
     wanted = Options() if options is None else options
     found = _controls_of(recording)
     kinds = _kinds(recording, found, wanted)
-    earth, notes = _earth(recording)
+    earth, notes = expected_earth(recording)
     compasses = _compasses(recording, wanted)
     steps = len(kinds) * len(compasses)
     judged: dict[str, list[_Judged]] = {}
@@ -148,7 +148,7 @@ def check(recording: Recording, options: Options | None = None) -> Mapping[int, 
     """
     wanted = Options() if options is None else options
     found = _controls_of(recording)
-    earth, _ = _earth(recording)
+    earth, _ = expected_earth(recording)
     by_kind = reported(found)
     verdicts = {}
     for compass in _compasses(recording, wanted):
@@ -244,7 +244,7 @@ def _compasses(recording: Recording, wanted: Options) -> list[int]:
     return left
 
 
-def _earth(recording: Recording) -> tuple[EarthField, list[str]]:
+def expected_earth(recording: Recording) -> tuple[EarthField, list[str]]:
     """The expected field at the recording's own position and date, else one like the readings."""
     if recording.position is not None and len(recording.position):
         latitude, longitude, altitude = np.median(recording.position.value, axis=0)
