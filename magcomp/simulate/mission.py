@@ -25,6 +25,8 @@ _NEAR_M = 3.0
 _REACTION_S = 1.2
 _MOST_ACCELERATION = 3.5
 _LEAN_S = 0.35
+_YAW_LAG_S = 0.3
+_YAW_RATE_LAG_S = 0.1
 _MOST_YAW_RATE = np.radians(50.0)
 
 
@@ -47,7 +49,9 @@ class Mission:
         self._position = np.zeros(2)
         self._velocity = np.zeros(2)
         self._acceleration = np.zeros(2)
-        self._believed_yaw = 0.0
+        self._wanted_yaw = 0.0
+        self._yaw = 0.0
+        self._yaw_rate = 0.0
 
     @property
     def duration_s(self) -> float:
@@ -98,9 +102,9 @@ class Mission:
         wanted = self._wanted_velocity() if cruising else np.zeros(2)
         if np.hypot(*wanted) > 1.0:
             course = float(np.arctan2(wanted[1], wanted[0]))
-            off = (course - self._believed_yaw + np.pi) % (2 * np.pi) - np.pi
+            off = (course - self._wanted_yaw + np.pi) % (2 * np.pi) - np.pi
             most = _MOST_YAW_RATE * _STEP_S
-            self._believed_yaw += min(max(off, -most), most)
+            self._wanted_yaw += min(max(off, -most), most)
         command = (wanted - self._velocity) / _REACTION_S
         size = float(np.hypot(*command))
         command *= min(1.0, _MOST_ACCELERATION / max(size, 1e-9))
@@ -111,8 +115,11 @@ class Mission:
             self._velocity = self._velocity * 0.9
         self._velocity = self._velocity + self._acceleration * _STEP_S
         self._position = self._position + self._velocity * _STEP_S
-        yaw = self._believed_yaw - heading_error
-        return self._position, self._velocity, self._acceleration, yaw
+        if airborne:
+            off = (self._wanted_yaw - heading_error - self._yaw + np.pi) % (2 * np.pi) - np.pi
+            self._yaw_rate += (off / _YAW_LAG_S - self._yaw_rate) * _STEP_S / _YAW_RATE_LAG_S
+            self._yaw += self._yaw_rate * _STEP_S
+        return self._position, self._velocity, self._acceleration, self._yaw
 
     def _wanted_velocity(self) -> FloatArray:
         """Along the line to the next corner; the corner after it once this one is near."""
