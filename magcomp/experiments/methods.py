@@ -68,9 +68,9 @@ class Corrections:
         if method == "uncorrected":
             return raw
         if method == "ellipsoid":
-            return (raw - self.centres[0]) @ self.soft_iron.T
+            return np.asarray((raw - self.centres[0]) @ self.soft_iron.T)
         if method == "paper":
-            return (raw - self.feet[level]) @ self.soft_iron.T
+            return np.asarray((raw - self.feet[level]) @ self.soft_iron.T)
         return self.fit.correction.apply(raw, u)
 
 

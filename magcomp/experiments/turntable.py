@@ -206,7 +206,7 @@ def _turn(
     return Turn(
         control=control,
         current_a=float(samples.u.mean()),
-        heading_deg=(np.arange(SECTORS) + 0.5) * (360.0 / SECTORS),
+        heading_deg=np.arange(0.5, SECTORS) * (360.0 / SECTORS),
         residual_deg=residuals,
     )
 
