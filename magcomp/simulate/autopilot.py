@@ -6,14 +6,15 @@ The rules, as in ArduCopter 4.6 (AUTOPILOTS.md, "Parameters" and "Rates"):
 - A set is answered with index 65535; setting _X answers for Y and Z too.
 - A read-only parameter answers with its old value and a warning in words.
 - The parameter list comes at its own pace; asking again begins it again.
+- At most 20 requests to read one parameter wait; more are dropped.
 - A command that is not known is acknowledged as unsupported.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar
 
 import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -28,6 +29,8 @@ BOARD_ID = "magcomp simulated vehicle"
 _NO_INDEX = 65535
 _FORCE = 21196.0
 _LIST_PER_10_MS = 8
+_READS_PER_10_MS = 5
+_READS_HELD = 20
 _MODES = {"stabilize": 0, "auto": 3, "guided": 4, "loiter": 5}
 
 
@@ -70,6 +73,7 @@ class Autopilot:
         self.once: deque[int] = deque()
         self.outgoing: deque[Any] = deque()
         self._list: deque[tuple[int, str]] = deque()
+        self._reads: deque[Any] = deque()
         self.store.sort_compasses()
         self.store.put("STAT_BOOTCNT", self.store["STAT_BOOTCNT"] + 1)
         self.outgoing.append(self.heartbeat())
@@ -83,7 +87,9 @@ class Autopilot:
         )
 
     def send_paced(self) -> None:
-        """Send the next few of a parameter list; called every 10 ms."""
+        """Send the next few parameters that were asked for; called every 10 ms."""
+        for _ in range(min(_READS_PER_10_MS, len(self._reads))):
+            self._answer_read(self._reads.popleft())
         names = len(self.store.listed) if self._list else 0
         for _ in range(min(_LIST_PER_10_MS, len(self._list))):
             index, name = self._list.popleft()
@@ -188,6 +194,10 @@ class Autopilot:
         self._list = deque(enumerate(self.store.listed))
 
     def _on_read(self, message: Any, now_ms: int) -> None:  # noqa: ARG002
+        if len(self._reads) < _READS_HELD:
+            self._reads.append(message)
+
+    def _answer_read(self, message: Any) -> None:
         listed = self.store.listed
         if message.param_index == -1 and message.param_id in self.store:
             self._send_parameter(message.param_id, _NO_INDEX)
@@ -299,7 +309,7 @@ class Autopilot:
         self.mode = int(message.param2)
         return int(mavlink.MAV_RESULT_ACCEPTED)
 
-    _handlers: dict[str, Callable[[Autopilot, Any, int], None]] = {  # noqa: RUF012
+    _handlers: ClassVar[Mapping[str, Callable[[Autopilot, Any, int], None]]] = {
         "PARAM_REQUEST_LIST": _on_list,
         "PARAM_REQUEST_READ": _on_read,
         "PARAM_SET": _on_set,
@@ -311,7 +321,7 @@ class Autopilot:
         "COMMAND_INT": _on_command,
     }
 
-    _commands: dict[int, Callable[[Autopilot, Any, int], int]] = {  # noqa: RUF012
+    _commands: ClassVar[Mapping[int, Callable[[Autopilot, Any, int], int]]] = {
         mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: _set_interval,
         mavlink.MAV_CMD_GET_MESSAGE_INTERVAL: _get_interval,
         mavlink.MAV_CMD_REQUEST_MESSAGE: _request_message,

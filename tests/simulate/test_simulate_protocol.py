@@ -56,6 +56,13 @@ class TestParameters:
         [value] = on_ground().ask(message, "PARAM_VALUE")
         assert value.param_index == 7
 
+    def test_of_many_reads_at_once_twenty_are_answered(self, on_ground):
+        ground = on_ground()
+        for index in range(50):
+            ground.say(mavlink.MAVLink_param_request_read_message(1, 1, b"", index))
+        answers = ground.hear("PARAM_VALUE", 1.0)
+        assert [answer.param_index for answer in answers] == list(range(20))
+
     @pytest.mark.parametrize("index", [-2, 5000, 32767])
     def test_reading_an_index_that_is_not_there_gets_no_reply(self, on_ground, index):
         message = mavlink.MAVLink_param_request_read_message(1, 1, b"", index)
