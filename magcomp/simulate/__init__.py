@@ -1,10 +1,11 @@
 """A vehicle to work on when there is none: ArduCopter 4.6's behaviour on MAVLink.
 
-Without a link and in no time: :func:`write_tlog`, or a :class:`Vehicle` that is
-given frames and time. On a link in real time: :func:`serve`.
+Without a link and in no time: :func:`write_tlog`, a :class:`Vehicle` that is
+given frames and time, or a :class:`LocalConnection` to one. On a link in real time: :func:`serve`.
 """
 
 from magcomp.simulate.faults import Faults, FaultyLink, Machine
+from magcomp.simulate.local import LocalConnection
 from magcomp.simulate.programs import PROGRAMS, Scenario, scenario
 from magcomp.simulate.recording import record, write_tlog
 from magcomp.simulate.server import run, serve
@@ -16,6 +17,7 @@ __all__ = [
     "Faults",
     "FaultyLink",
     "Frame",
+    "LocalConnection",
     "Machine",
     "Scenario",
     "Truth",

@@ -11,7 +11,7 @@ from magcomp.errors import UsageError
 from magcomp.simulate.flight import Flight
 from magcomp.simulate.mission import Mission
 from magcomp.simulate.motion import Program
-from magcomp.simulate.timeline import paper_turntable, sweep, turntable
+from magcomp.simulate.timeline import paper_turntable, parked, sweep, turntable
 from magcomp.simulate.truth import BATTERY, PAPER_BENCH, Power, Truth, draw_truth
 
 Compensation = Literal["off", "wrong", "exact"]
@@ -58,6 +58,7 @@ _RECIPES: Mapping[str, _Recipe] = {
     ),
     "sweep": _Recipe("sweep", True, _STABILIZE, sweep),
     "flight": _Recipe("flight", True, _LOITER, Flight),
+    "parked": _Recipe("parked", True, _STABILIZE, lambda _: parked()),
     "mission": _Recipe("mission", True, _AUTO, lambda _: Mission(), strength=_STRONG),
 }
 

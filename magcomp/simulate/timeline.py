@@ -125,6 +125,11 @@ def sweep(seed: int, levels: Sequence[float] = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.
     return Timeline([Segment(8.0, 0.0, armed=False), *steps, Segment(3.0, 0.0)], heading)
 
 
+def parked() -> Timeline:
+    """Disarmed and still: a vehicle to be written to."""
+    return Timeline([Segment(1.0, 0.0, armed=False)])
+
+
 def _tumbles(rng: np.random.Generator, count: int, level: float) -> list[Segment]:
     """Random turns that end where they began."""
     segments: list[Segment] = []

@@ -127,7 +127,8 @@ class Truth:
     Attributes
     ----------
     seed, kind
-        What it was drawn from; ``kind`` is ``"rig"``, ``"sweep"``, ``"flight"`` or ``"mission"``.
+        What it was drawn from; ``kind`` is ``"rig"``, ``"sweep"``, ``"flight"``, ``"mission"``
+        or ``"parked"``.
     home
         Latitude and longitude in degrees, metres above sea level.
     interference
