@@ -15,7 +15,7 @@ from typing import NamedTuple, NoReturn
 import click
 
 from magcomp import __version__
-from magcomp.cli.output import complain
+from magcomp.cli.output import complain, flush
 from magcomp.errors import ExitCode, MagcompError
 
 
@@ -83,7 +83,9 @@ def main(arguments: list[str] | None = None) -> NoReturn:
         Without the program's name; those of the process by default.
     """
     arguments = sys.argv[1:] if arguments is None else arguments
-    sys.exit(run(arguments))
+    code = run(arguments)
+    flush()
+    sys.exit(code)
 
 
 def run(arguments: list[str]) -> int:

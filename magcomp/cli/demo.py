@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import click
@@ -11,7 +12,7 @@ from magcomp.cli.output import answer, look
 from magcomp.cli.truth import KnownTruth
 from magcomp.cli.work import fit_log, present_parameters
 from magcomp.errors import ExitCode, InputError
-from magcomp.model import Analysis, Grade, Recording
+from magcomp.model import Grade, Recording
 from magcomp.session import Options, parameter_set
 
 _NAME = "flight"
@@ -25,9 +26,9 @@ def demo() -> ExitCode:
 
     log, truth = _recording()
     recording, analysis = fit_log(log, Options(), None)
-    present = present_parameters(recording)
-    answer(as_text.analysis_text(analysis, present, look(), advise=False))
-    rows = _against(truth, recording, analysis)
+    present, fitted = present_parameters(recording), parameter_set(analysis).values
+    answer(as_text.analysis_text(analysis, fitted, present, look(), advise=False))
+    rows = _against(truth, recording, fitted, [result.fit.compass for result in analysis.compasses])
     answer(as_text.truth_text(str(log.with_suffix(".json")), rows, look()))
     return ExitCode.REJECTED if analysis.grade is Grade.REJECTED else ExitCode.GOOD
 
@@ -47,17 +48,16 @@ def _recording() -> tuple[Path, KnownTruth]:
 
 
 def _against(
-    truth: KnownTruth, recording: Recording, analysis: Analysis
+    truth: KnownTruth, recording: Recording, fitted: Mapping[str, float], compasses: Sequence[int]
 ) -> list[tuple[float, float, float]]:
     """Current, and the true heading error of the worst compass before and after."""
     before = present_parameters(recording)
-    after = {**before, **parameter_set(analysis).values}
-    numbers = [result.fit.compass for result in analysis.compasses]
+    after = {**before, **fitted}
 
     def worst(parameters: dict[str, float], amperes: float) -> float:
         return max(
             truth.heading_error_deg(parameters, compass, amperes, recording.start_unix_s)
-            for compass in numbers
+            for compass in compasses
         )
 
     return [(amperes, worst(before, amperes), worst(after, amperes)) for amperes in _CURRENTS]

@@ -19,7 +19,7 @@ from magcomp.cli.options import (
 from magcomp.cli.output import answer, complain, look
 from magcomp.cli.work import fit_log, present_parameters
 from magcomp.errors import ExitCode
-from magcomp.model import Analysis, Grade
+from magcomp.model import Grade
 from magcomp.parameters.files import SUFFIXES, write_parameter_file
 from magcomp.report import as_json
 from magcomp.report import files as report_files
@@ -73,12 +73,12 @@ def fit(
     if report is not None:
         check_output(report, report_files.SUFFIXES, force=force)
     recording, analysis = fit_log(log, options, selection.system)
-    written = _write(analysis, output, force=force)
-    if report is not None:
-        page = report_files.report_text(
-            report.suffix, recording, analysis, options=options, written=written
-        )
-        report_files.write_text(report, page, force=force)
+    rejected = analysis.grade is Grade.REJECTED
+    chosen = parameter_set(analysis, include_rejected=rejected and force)
+    written = None
+    if output is not None and (force or not rejected):
+        write_parameter_file(output, chosen, force=force)
+        written = str(output)
     if to_json:
         answer(as_json.dumps(as_json.analysis_object(analysis, written)))
     else:
@@ -86,8 +86,12 @@ def fit(
         from magcomp.report import as_text  # noqa: PLC0415
 
         present = present_parameters(recording)
-        answer(as_text.analysis_text(analysis, present, look(), written=written, verbose=verbose))
-    if analysis.grade is not Grade.REJECTED:
+        answer(
+            as_text.analysis_text(
+                analysis, chosen.values, present, look(), written=written, verbose=verbose
+            )
+        )
+    if not rejected:
         return ExitCode.GOOD
     if output is not None and written is None:
         complain(
@@ -95,13 +99,3 @@ def fit(
             "it all the same"
         )
     return ExitCode.REJECTED
-
-
-def _write(analysis: Analysis, output: Path | None, *, force: bool) -> str | None:
-    """Write the parameter file that was asked for, and return its name if it was written."""
-    rejected = analysis.grade is Grade.REJECTED
-    if output is None or (rejected and not force):
-        return None
-    chosen = parameter_set(analysis, include_rejected=rejected)
-    write_parameter_file(output, chosen, force=force)
-    return str(output)

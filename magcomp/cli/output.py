@@ -15,8 +15,7 @@ from magcomp.report.look import Look
 Step = Callable[[str, float], None]
 """What is being done, and the share done, 0 … 1."""
 
-_MOST_COLUMNS = 100
-_USUAL_COLUMNS = 80
+_LEAST_COLUMNS, _MOST_COLUMNS = 80, 100
 
 
 def complain(message: str) -> None:
@@ -44,7 +43,9 @@ def answer(text: str) -> None:
         raise OutputError(f"stdout must be writable; instead received: {error.strerror}") from error
 
 
-def _write(stream: TextIO, text: str) -> None:
+def _write(stream: TextIO | None, text: str) -> None:
+    if stream is None:  # a parent closed it: there is nobody to tell
+        return
     # What the stream's encoding lacks (block characters, half a file name) must not end the run.
     encoding = stream.encoding or "utf-8"
     printable = text.encode(encoding, errors="replace").decode(encoding)
@@ -55,8 +56,19 @@ def _write(stream: TextIO, text: str) -> None:
         _discard(stream)
 
 
-def _discard(stream: TextIO) -> None:
-    """Let the interpreter's own last flush of a stream that is broken go nowhere."""
+def flush() -> None:
+    """Flush both streams, so that the interpreter's own last flush has nothing to complain of."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            if stream is not None:
+                stream.flush()
+        except OSError:
+            _discard(stream)
+
+
+def _discard(stream: TextIO | None) -> None:
+    if stream is None:
+        return
     try:
         descriptor = stream.fileno()
     except (OSError, ValueError):
@@ -67,9 +79,10 @@ def _discard(stream: TextIO) -> None:
 
 
 def look() -> Look:
-    """The terminal's width, at most 100 columns, 80 where there is none; colours where wanted."""
-    size = shutil.get_terminal_size((_USUAL_COLUMNS, 24))
-    return Look(columns=min(size.columns, _MOST_COLUMNS), colour=_colour_wanted())
+    """The terminal's width, from 80 to 100 columns; colours where wanted."""
+    size = shutil.get_terminal_size((_LEAST_COLUMNS, 24))
+    width = min(max(size.columns, _LEAST_COLUMNS), _MOST_COLUMNS)
+    return Look(columns=width, colour=_colour_wanted())
 
 
 def _colour_wanted() -> bool:
@@ -78,13 +91,13 @@ def _colour_wanted() -> bool:
         return False
     if os.environ.get("FORCE_COLOR"):
         return True
-    return sys.stdout.isatty() and os.environ.get("TERM") != "dumb"
+    return sys.stdout is not None and sys.stdout.isatty() and os.environ.get("TERM") != "dumb"
 
 
 @contextmanager
 def progress() -> Iterator[Step]:
     """Show what is being done on stderr while it is done, if stderr is a terminal."""
-    if not sys.stderr.isatty():
+    if sys.stderr is None or not sys.stderr.isatty():
         yield lambda _what, _share: None
         return
     # Rich takes a tenth of a second to import, which only a terminal is worth.

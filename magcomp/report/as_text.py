@@ -34,6 +34,7 @@ _DIGITS = re.compile(r"\d+(\.\d+)?")
 
 def analysis_text(
     analysis: Analysis,
+    parameters: Mapping[str, float],
     present: Mapping[str, float],
     look: Look,
     *,
@@ -47,6 +48,8 @@ def analysis_text(
     ----------
     analysis
         The answer.
+    parameters
+        What is, or would be, written.
     present
         Parameters as the recording left them, for the difference.
     look
@@ -63,7 +66,7 @@ def analysis_text(
             *heading(analysis.source, analysis.vehicle, analysis.duration_s),
             *findings(analysis),
             *evidence(analysis),
-            *_parameters(analysis, present, verbose=verbose),
+            *_parameters(parameters, present, verbose=verbose),
             *(_levels(analysis) if verbose else ()),
             *(_ending(analysis, written) if advise else ()),
         ],
@@ -242,11 +245,8 @@ def _note(text: str) -> RenderableType:
 
 
 def _parameters(
-    analysis: Analysis, present: Mapping[str, float], *, verbose: bool
+    values: Mapping[str, float], present: Mapping[str, float], *, verbose: bool
 ) -> Iterator[RenderableType]:
-    values: dict[str, float] = {}
-    for result in analysis.compasses:
-        values.update(result.parameters)
     if not values:
         return
     yield Text()

@@ -13,6 +13,7 @@ from rich.text import Text
 from magcomp.model import CURRENT, CompassResult, MotorFit, Verdict
 from magcomp.report import words
 
+_KINDS = ("COMPASS_MOTCT", "COMPASS_MOT", "COMPASS_OFS", "COMPASS_DIA", "COMPASS_ODI")
 _VECTOR = re.compile(r"(COMPASS_[A-Z]+[23]?)_([XYZ])")
 
 
@@ -115,12 +116,17 @@ def parameters(
 
 
 def _vectors(values: Mapping[str, float]) -> dict[str, list[str]]:
-    """Names of parameters by vector; the motor vectors and the switch first."""
+    """Names of parameters by vector: the switch, then motor, offset and soft iron by compass."""
     found: dict[str, list[str]] = {}
     for name in values:
         match = _VECTOR.fullmatch(name)
         found.setdefault(match[1] if match else name, []).append(name)
-    return dict(sorted(found.items(), key=lambda item: "MOT" not in item[0]))
+
+    def place(vector: str) -> tuple[int, str]:
+        kind = vector.rstrip("23")
+        return (_KINDS.index(kind) if kind in _KINDS else len(_KINDS), vector)
+
+    return {vector: found[vector] for vector in sorted(found, key=place)}
 
 
 def _same(new: float, old: float) -> bool:

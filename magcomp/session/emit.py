@@ -29,7 +29,10 @@ def emit(
         A whole correction for each compass: motor vector, offsets re-centred for it, soft iron.
         COMPASS_MOTCT stands with every compass, because it is one switch for all. A rejected
         compass whose stored motor vector would come into force with the switch gets zeros.
+        Empty where every compass is rejected: then the switch is not touched either.
     """
+    if all(verdict.grade is Grade.REJECTED for _, verdict, _ in results):
+        return {fit.compass: {} for fit, _, _ in results}
     return {
         fit.compass: _for_this_vehicle(
             recording,
