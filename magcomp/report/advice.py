@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping
 from typing import Any
 
@@ -52,7 +53,7 @@ def steps(document: Document) -> tuple[str, ...]:
         elif compass["verdict"] == "rejected":
             found.append(_doubt(compass, _left(compass)))
     found.append(
-        "Fly once more, gently, and run “magcomp check” on the new log: the heading error it "
+        "Fly once more, gently, and run `magcomp check` on the new log: the heading error it "
         "finds should be what this report promises."
     )
     return tuple(found)
@@ -60,11 +61,11 @@ def steps(document: Document) -> tuple[str, ...]:
 
 def _write(document: Document, kept: list[int]) -> str:
     where = document.get("written")
-    source = document["source"]
+    source = shlex.quote(document["source"])
     how = (
-        f"they are in {where}"
+        f"they are in `{where}`"
         if where
-        else f"“magcomp fit {source} -o compass.param” writes them to a file"
+        else f"`magcomp fit {source} -o compass.param` writes them to a file"
     )
     return (
         f"Disarm, then write the parameters of {words.compasses(kept)} with your ground station; "

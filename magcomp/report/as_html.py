@@ -18,8 +18,10 @@ from magcomp.report.evidence import CompassPlots, compass_plots
 from magcomp.report.figure import Figure, quantity_of
 from magcomp.report.figures import figures
 from magcomp.report.html_page import ASSETS, canvas, page
-from magcomp.report.html_parts import Numbers, badge, sign, text
+from magcomp.report.html_parts import Numbers, badge, sign, text, with_code
 from magcomp.session import Options, parameter_set
+
+_EVIDENCE = ("cloud", "centres", "shift", "strength", "residuals")
 
 _METHODS = {
     "sweep": "sweep (the vehicle stood still while the motors worked)",
@@ -81,7 +83,7 @@ def _head(numbers: Numbers, analysis: Analysis) -> str:
     """Verdict first, then what to do, then the compasses at a glance."""
     document = numbers.document
     grade = document["verdict"]
-    steps = "".join(f"<li>{text(step)}</li>" for step in advice.steps(document))
+    steps = "".join(f"<li>{with_code(step)}</li>" for step in advice.steps(document))
     return (
         f'<header class="verdict {grade}">'
         f'<p class="overline">Compass and motors · {text(analysis.source)} · '
@@ -135,12 +137,13 @@ def _panel(
         f'<section class="panel" role="tabpanel" id="compass-{number}" '
         f'aria-labelledby="tab-{number}"><h2>Compass {number}{badge(compass["verdict"])}</h2>'
         f'<ul class="reasons">{reasons}</ul>'
-        f"<h3>Heading error</h3>{shown['heading']}"
-        f"{html_tables.heading_errors(numbers, index, quantity)}"
-        f"<h3>Parameters, old and new</h3>{html_tables.parameters(numbers, index, present)}"
-        f"<h3>What was found</h3>{html_tables.findings(numbers, index, quantity)}"
-        f'<div class="figures">{shown["cloud"]}{shown["shift"]}{shown["strength"]}'
-        f"{shown['residuals']}</div>"
+        f'<h3>Heading error</h3><div class="beside wider">{shown["heading"]}'
+        f"{html_tables.heading_errors(numbers, index, quantity)}</div>"
+        f'<div class="beside"><div><h3>Parameters, old and new</h3>'
+        f"{html_tables.parameters(numbers, index, present)}</div><div><h3>What was found</h3>"
+        f"{html_tables.findings(numbers, index, quantity)}</div></div>"
+        f'<h3>The evidence</h3><div class="figures">'
+        f"{''.join(shown[name] for name in _EVIDENCE)}</div>"
         f"<h3>What the log covers</h3>{html_tables.coverage(numbers, index, plots, quantity)}"
         f'<div class="figures">{shown["sphere"]}{shown["turn"]}</div>'
         f'<p class="note">Method: {text(method)}, because {text(compass["why"])}; '

@@ -7,6 +7,7 @@ from typing import Any
 
 from magcomp.report import advice, words
 from magcomp.report.figure import Quantity, quantity_of
+from magcomp.report.html_parts import parameter
 
 _SPECIAL = str.maketrans({sign: f"\\{sign}" for sign in "\\`*_{}[]<>#|"})
 
@@ -29,7 +30,7 @@ def markdown(document: Mapping[str, Any], present: Mapping[str, float]) -> str:
         "",
         "## What to do",
         "",
-        *(f"{number}. {_plain(step)}" for number, step in enumerate(advice.steps(document), 1)),
+        *(f"{number}. {_with_code(step)}" for number, step in enumerate(advice.steps(document), 1)),
     ]
     for compass in document["compasses"]:
         lines += ["", *_compass(compass, present)]
@@ -63,7 +64,7 @@ def _compass(compass: Mapping[str, Any], present: Mapping[str, float]) -> Iterat
         yield from _table(
             ["parameter", "in the log", "new"],
             [
-                [f"`{name}`", _old(present, name), words.number(value)]
+                [f"`{name}`", _old(present, name), parameter(value)]
                 for name, value in compass["parameters"].items()
             ],
         )
@@ -72,7 +73,7 @@ def _compass(compass: Mapping[str, Any], present: Mapping[str, float]) -> Iterat
 
 
 def _old(present: Mapping[str, float], name: str) -> str:
-    return words.number(present[name]) if name in present else "not in the log"
+    return parameter(present[name]) if name in present else "not in the log"
 
 
 def _found(compass: Mapping[str, Any], quantity: Quantity) -> Iterator[str]:
@@ -119,6 +120,12 @@ def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
     yield "|---|" + "---:|" * (len(head) - 1)
     for row in rows:
         yield f"| {' | '.join(row)} |"
+
+
+def _with_code(text: str) -> str:
+    """Text of which only what stands between backticks is Markdown."""
+    parts = text.split("`")
+    return "`".join(part if k % 2 else _plain(part) for k, part in enumerate(parts))
 
 
 def _plain(text: str) -> str:

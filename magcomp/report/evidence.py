@@ -25,7 +25,7 @@ from magcomp.model import (
     Samples,
 )
 
-MOST_POINTS = 2000
+MOST_POINTS = 1500
 """Readings a picture is drawn from; more only make it slower."""
 
 SPHERE_BANDS, SPHERE_SECTORS = 6, 12

@@ -84,6 +84,11 @@ def quantity_of(regressor: str) -> Quantity:
     return Quantity("throttle", "%", 100.0)
 
 
+def shade(share: float) -> str:
+    """The colour at a place on the scale, 0 … 1."""
+    return f"{SCALE}:{min(max(share, 0.0), 1.0):.3f}"
+
+
 def rounded(values: ArrayLike, digits: int) -> Any:
     """Nested lists of short numbers: the page must stay small."""
     return np.round(np.asarray(values, float), digits).tolist()

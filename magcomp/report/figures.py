@@ -30,7 +30,7 @@ from magcomp.report.figure import (
     quantity_of,
     rounded,
 )
-from magcomp.report.figures_cloud import cloud
+from magcomp.report.figures_cloud import centres, cloud
 
 _MEDIANS = 12
 _LEAST_IN_MEDIAN = 8
@@ -50,6 +50,7 @@ def figures(result: CompassResult, plots: CompassPlots) -> tuple[Figure, ...]:
     return (
         heading_error(result, quantity),
         cloud(result, plots, quantity),
+        centres(result, quantity),
         shift(result, quantity),
         strength(result, plots, quantity),
         unexplained(result, plots, quantity),
@@ -98,14 +99,13 @@ def heading_error(result: CompassResult, quantity: Quantity) -> Figure:
     )
     return Figure(
         "heading",
-        "Heading error",
+        "Before and after",
         f"The squares show how wrong the heading can be now, the circles what the fit leaves; the "
         f"shaded part, {quantity.text(covered.u_low)} to {quantity.text(covered.u_high)}, is what "
         "the log covers, the rest is extrapolated.",
         data,
         layout,
         height=360,
-        wide=True,
     )
 
 
@@ -210,7 +210,7 @@ def unexplained(result: CompassResult, plots: CompassPlots, quantity: Quantity) 
     each = (1.0 - bottom) / strips
     layout = flat(
         axis("time (s)", anchor="y", domain=[0.0, 1.0]),
-        axis(f"{quantity.unit}", domain=[0.0, bottom - 0.05]),
+        axis(f"{quantity.name} ({quantity.unit})", domain=[0.0, bottom - 0.05]),
         margin={"l": 8, "r": 12, "t": 36, "b": 8},
     )
     for index, part in enumerate(plots.parts):
@@ -236,10 +236,9 @@ def unexplained(result: CompassResult, plots: CompassPlots, quantity: Quantity) 
     return Figure(
         "residuals",
         "Unexplained field in time",
-        f"What neither correction explains, in mGauss, above the {quantity.name} "
-        f"({quantity.unit}): what is left over is {residual.before:.1f} mGauss with the correction "
-        f"in force and {residual.after:.1f} with the fit, and should look like noise that does "
-        f"not follow the {quantity.name}.",
+        f"Field that each correction leaves unexplained, {residual.before:.1f} mGauss root mean "
+        f"square in force and {residual.after:.1f} with the fit: what is left should look like "
+        f"noise whatever the {quantity.name} in the lowest strip does.",
         data,
         layout,
         height=230 + 110 * strips,

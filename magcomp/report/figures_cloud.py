@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from magcomp.model import CompassResult, FloatArray, Level, MotorFit
 from magcomp.report.evidence import CompassPlots
-from magcomp.report.figure import GRID, INK, SCALE, Figure, Quantity, Trace, rounded
+from magcomp.report.figure import GRID, INK, SCALE, Figure, Quantity, Trace, rounded, shade
 
 _MOST_ELLIPSOIDS = 5
 _FLIGHT_ELLIPSOIDS = 2
+_CHI2_95 = 7.815
+"""95 % quantile of χ² with three degrees of freedom."""
+
+SPACE_HEIGHT = 460
+"""Height of a picture in space, pixels."""
 
 
 def cloud(result: CompassResult, plots: CompassPlots, quantity: Quantity) -> Figure:
@@ -31,7 +37,7 @@ def cloud(result: CompassResult, plots: CompassPlots, quantity: Quantity) -> Fig
     shades = {"colorscale": SCALE, "cmin": 0.0, "cmax": top}
     data = [
         _points(raw, quantity.values(plots.u, 1), quantity, shades),
-        *(_ellipsoid(fit, level, quantity, shades) for level in levels),
+        *(_ellipsoid(fit, level, quantity, top) for level in levels),
         *_line_of_centres(fit, quantity),
     ]
     return Figure(
@@ -40,9 +46,36 @@ def cloud(result: CompassResult, plots: CompassPlots, quantity: Quantity) -> Fig
         _caption(fit, quantity, len(levels)),
         data,
         space(),
-        height=520,
-        wide=True,
+        height=SPACE_HEIGHT,
     )
+
+
+def centres(result: CompassResult, quantity: Quantity) -> Figure:
+    """The centres near by: each with its 95 % ellipsoid, and the line through them."""
+    fit = result.fit
+    top = float(quantity.scale * max((level.u for level in fit.levels), default=1.0))
+    data = [
+        *(_doubt(level, quantity, top) for level in fit.levels),
+        *_line_of_centres(fit, quantity),
+    ]
+    off = 0.0 if fit.line is None else fit.line.rms
+    return Figure(
+        "centres",
+        "The line of centres",
+        f"The same centres near by, each in the ellipsoid it lies in with 95 % probability: they "
+        f"stand {off:.1f} mGauss off the straight line that the method rests on.",
+        data,
+        space(),
+        height=SPACE_HEIGHT,
+    )
+
+
+def _doubt(level: Level, quantity: Quantity, top: float) -> Trace:
+    """Where a centre lies with 95 % probability, as wires."""
+    values, vectors = np.linalg.eigh(level.covariance)
+    root = vectors * np.sqrt(np.maximum(values, 0.0) * _CHI2_95)
+    rings = wires(heights=(0.0,), turns=(0.0, 90.0))
+    return _wired(level.centre + rings @ root.T, level, quantity, top)
 
 
 def _drawn(fit: MotorFit) -> tuple[Level, ...]:
@@ -90,12 +123,14 @@ def _points(raw: FloatArray, u: list[float], quantity: Quantity, shades: dict[st
     }
 
 
-def _ellipsoid(fit: MotorFit, level: Level, quantity: Quantity, shades: dict[str, Any]) -> Trace:
+def _ellipsoid(fit: MotorFit, level: Level, quantity: Quantity, top: float) -> Trace:
     """Wires of |D · (raw − centre)| = F, PAPER.md 5 and 6."""
-    sphere = wires()
-    surface = level.centre + fit.strength * np.linalg.solve(fit.correction.soft_iron, sphere.T).T
-    x, y, z = ([None if np.isnan(v) else v for v in row] for row in rounded(surface.T, 1))
-    shown = float(quantity.scale * level.u)
+    surface = np.linalg.solve(fit.correction.soft_iron, fit.strength * wires().T).T
+    return _wired(level.centre + surface, level, quantity, top)
+
+
+def _wired(surface: FloatArray, level: Level, quantity: Quantity, top: float) -> Trace:
+    x, y, z = ([None if np.isnan(v) else v for v in row] for row in rounded(surface.T, 2))
     return {
         "type": "scatter3d",
         "mode": "lines",
@@ -103,21 +138,33 @@ def _ellipsoid(fit: MotorFit, level: Level, quantity: Quantity, shades: dict[str
         "x": x,
         "y": y,
         "z": z,
-        "line": {"color": [shown] * len(x), "width": 1.5, **shades},
-        "opacity": 0.55,
+        "line": {"color": shade(quantity.scale * level.u / top if top else 0.0), "width": 2},
+        "opacity": 0.6,
+        "showlegend": False,
         "hoverinfo": "name",
     }
 
 
-def wires() -> FloatArray:
-    """Circles of a unit sphere, with rows of NaN between them, shape (n, 3)."""
-    angle = np.linspace(0.0, 2 * np.pi, 49)
+def wires(
+    heights: Sequence[float] = (-60.0, -30.0, 0.0, 30.0, 60.0),
+    turns: Sequence[float] = (0.0, 45.0, 90.0, 135.0),
+) -> FloatArray:
+    """Circles of a unit sphere, with rows of NaN between them, shape (n, 3).
+
+    Parameters
+    ----------
+    heights
+        Latitudes of the level circles, degrees.
+    turns
+        Azimuths of the upright circles, degrees.
+    """
+    angle = np.linspace(0.0, 2 * np.pi, 37)
     gap = np.full((1, 3), np.nan)
     circles = []
-    for height in np.radians([-60.0, -30.0, 0.0, 30.0, 60.0]):
+    for height in np.radians(heights):
         ring = [np.cos(height) * np.cos(angle), np.cos(height) * np.sin(angle)]
         circles += [np.column_stack([*ring, np.full_like(angle, np.sin(height))]), gap]
-    for turned in np.radians([0.0, 45.0, 90.0, 135.0]):
+    for turned in np.radians(turns):
         ring = [np.cos(angle) * np.cos(turned), np.cos(angle) * np.sin(turned)]
         circles += [np.column_stack([*ring, np.sin(angle)]), gap]
     return np.vstack(circles)
@@ -171,15 +218,17 @@ def space() -> dict[str, Any]:
 
     return {
         "scene": {
-            "xaxis": side("x forward (mGauss)"),
+            "xaxis": side("x forward"),
             # Down is drawn downwards, as the vehicle stands; reversing y too keeps the picture from
             # being a mirror image.
-            "yaxis": {**side("y right (mGauss)"), "autorange": "reversed"},
-            "zaxis": {**side("z down (mGauss)"), "autorange": "reversed"},
+            "yaxis": {**side("y right"), "autorange": "reversed"},
+            "zaxis": {**side("z down"), "autorange": "reversed"},
             "aspectmode": "data",
-            "camera": {"eye": {"x": 1.35, "y": -1.35, "z": 0.7}},
+            "camera": {
+                "eye": {"x": 1.45, "y": -1.45, "z": 0.65},
+                "center": {"x": 0, "y": 0, "z": -0.08},
+            },
         },
-        "showlegend": True,
-        "legend": {"orientation": "h", "x": 0, "y": 1.02, "yanchor": "bottom", "xanchor": "left"},
-        "margin": {"l": 0, "r": 0, "t": 30, "b": 0},
+        "showlegend": False,
+        "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
     }

@@ -37,7 +37,7 @@ class Numbers:
         if value is None:
             return DASH
         shown = value * scale
-        text = words.number(shown) if decimals is None else f"{shown:.{decimals}f}"
+        text = parameter(shown) if decimals is None else f"{shown:.{decimals}f}"
         place = ".".join(map(str, key))
         scaled = "" if scale == 1.0 else f' data-scale="{scale:g}"'
         return f'<data value="{value!r}" data-key="{escape(place)}"{scaled}>{minus(text)}</data>'
@@ -49,6 +49,11 @@ class Numbers:
         )
 
 
+def parameter(value: float) -> str:
+    """A parameter's value: short, and finer than a heading can tell."""
+    return words.number(value, 4)
+
+
 def minus(text: str) -> str:
     """A number's text with a true minus sign."""
     return text.replace("-", "\N{MINUS SIGN}")
@@ -57,6 +62,12 @@ def minus(text: str) -> str:
 def text(words_: str) -> str:
     """Text, escaped."""
     return escape(words_, quote=True)
+
+
+def with_code(words_: str) -> str:
+    """Text, escaped; what stands between backticks is code."""
+    parts = [text(part) for part in words_.split("`")]
+    return "".join(f"<code>{part}</code>" if k % 2 else part for k, part in enumerate(parts))
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]], caption: str, kind: str = "") -> str:

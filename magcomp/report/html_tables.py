@@ -9,7 +9,7 @@ from magcomp.model import Recording
 from magcomp.report import words
 from magcomp.report.evidence import CompassPlots
 from magcomp.report.figure import Quantity, quantity_of
-from magcomp.report.html_parts import DASH, Numbers, badge, facts, minus, table, text
+from magcomp.report.html_parts import DASH, Numbers, badge, facts, minus, parameter, table, text
 
 
 def overview(numbers: Numbers) -> str:
@@ -31,11 +31,14 @@ def overview(numbers: Numbers) -> str:
             f'<p class="figure"><span class="was">{before}°</span>'
             f'<span class="arrow" aria-label="falls to at most">→</span>'
             f'<span class="now">≤ {bound}°</span></p>'
-            f"<p>heading error at {u} {quantity.unit} {quantity.name}, now and with the fit "
-            f"(95 % bound)</p>"
+            f"<p>heading error at {u} {_unit(quantity)}, now and with the fit (95 % bound)</p>"
             f"<p>unexplained field on data the fit did not see: {was} → {left} mGauss</p></article>"
         )
     return f'<div class="cards">{"".join(cards)}</div>'
+
+
+def _unit(quantity: Quantity) -> str:
+    return quantity.unit if quantity.scale == 1.0 else f"{quantity.unit} {quantity.name}"
 
 
 def _covered_row(compass: Mapping[str, object]) -> int:
@@ -75,7 +78,7 @@ def parameters(numbers: Numbers, index: int, present: Mapping[str, float]) -> st
     changed, same = [], []
     for name, value in numbers.at(*key).items():
         old = present.get(name)
-        shown = minus(words.number(old)) if old is not None else "not in the log"
+        shown = minus(parameter(old)) if old is not None else "not in the log"
         row = [f"<code>{text(name)}</code>", shown, numbers.show(*key, name)]
         if old is not None and old == value:
             same.append(row)
@@ -146,7 +149,7 @@ def _straightness(numbers: Numbers, index: int) -> str:
         return DASH
     return (
         f"{numbers.show(*key, 'straightness', decimals=4)} "
-        f"<small>({numbers.show(*key, 'rms_mgauss', decimals=1)} mGauss off it)</small>"
+        f"<small>({numbers.show(*key, 'rms_mgauss', decimals=2)} mGauss off it)</small>"
     )
 
 

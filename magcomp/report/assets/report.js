@@ -24,8 +24,23 @@
   const canvases = [...document.querySelectorAll(".canvas")];
   const PRINT_WIDE = 680, PRINT_HALF = 330;
 
+  // "@scale:0.25" is the colour a quarter of the way along the scale.
+  const between = (scale, share) => {
+    const next = Math.max(1, scale.findIndex(([at]) => at >= share));
+    const [[low, from], [high, to]] = [scale[next - 1], scale[next]];
+    const part = (share - low) / (high - low);
+    const channel = (colour, k) => parseInt(colour.slice(1 + 2 * k, 3 + 2 * k), 16);
+    return `rgb(${[0, 1, 2].map((k) => Math.round(channel(from, k) * (1 - part) + channel(to, k) * part))})`;
+  };
+
+  const colour = (name, palette) => {
+    const [token, share] = name.split(":");
+    const found = palette[token] ?? name;
+    return share === undefined ? found : between(found, Number(share));
+  };
+
   const coloured = (node, palette) => {
-    if (typeof node === "string") return node[0] === "@" ? palette[node] ?? node : node;
+    if (typeof node === "string") return node[0] === "@" ? colour(node, palette) : node;
     if (Array.isArray(node)) return node.map((item) => coloured(item, palette));
     if (node === null || typeof node !== "object") return node;
     return Object.fromEntries(Object.entries(node).map(([k, v]) => [k, coloured(v, palette)]));
@@ -40,12 +55,16 @@
       layout: {
         paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
         font: { family, size: 12, color: palette["@ink"] },
+        modebar: { bgcolor: "rgba(0,0,0,0)", color: palette["@muted"], activecolor: palette["@ink"], orientation: "v" },
         hoverlabel: { font: { family } },
         dragmode: layout.scene ? "orbit" : touch.matches ? false : "zoom",
         ...layout, ...size,
       },
-      config: { displaylogo: false, responsive: !size.width, displayModeBar: touch.matches ? false : "hover",
-        modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] },
+      config: {
+        displaylogo: false, responsive: !size.width, scrollZoom: false,
+        displayModeBar: Boolean(layout.scene) && !touch.matches,
+        modeBarButtons: [["orbitRotation", "zoom3d", "pan3d", "resetCameraDefault3d"]],
+      },
     };
   };
 
