@@ -17,6 +17,7 @@ from magcomp.model import FloatArray, IntArray, symmetric
 
 _SHAPE = 6
 _LEAST_READINGS = 12
+_LEAST_SPREAD = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +87,12 @@ def fit_ellipsoids(
     if len(raw) < _LEAST_READINGS or count == 0:
         raise FitRejectedError(
             f"An ellipsoid needs at least {_LEAST_READINGS} readings; instead received {len(raw)}"
+        )
+    moved = float(np.median(np.linalg.norm(raw - np.median(raw, axis=0), axis=1)))
+    if moved < _LEAST_SPREAD * strength:
+        raise FitRejectedError(
+            f"An ellipsoid needs readings from all round; instead half of them lie within "
+            f"{moved:.3g} mGauss of one point"
         )
     begin = _spheres(raw, level, count, strength) if start is None else _packed(start)
     rows = np.arange(len(raw))

@@ -1,0 +1,163 @@
+"""Control quantities: the throttle's cut, the thrust curve, and currents rebuilt from outputs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from synthetic import Flown
+
+from magcomp.align import controls, interpolate, reported
+from magcomp.model import CURRENT, THROTTLE, ParameterChange, ParameterHistory, Recording, Series
+
+CURVE = {"MOT_THST_EXPO": 0.65, "MOT_SPIN_MIN": 0.15, "MOT_SPIN_MAX": 0.95}
+LIMITS = {"MOT_PWM_MIN": 1000.0, "MOT_PWM_MAX": 2000.0}
+
+
+def history(values: dict[str, float]) -> ParameterHistory:
+    return ParameterHistory(tuple(ParameterChange(0.0, n, v) for n, v in values.items()))
+
+
+def thrust_at(time: np.ndarray) -> np.ndarray:
+    return 0.4 + 0.15 * np.sin(time * 1.3) + 0.1 * np.sin(time * 0.31)
+
+
+def outputs(time: np.ndarray, thrust: np.ndarray) -> Series:
+    """Servo outputs of the firmware's thrust curve for a thrust 0 … 1, all motors alike."""
+    expo, low, high = CURVE.values()
+    curve = (expo - 1 + np.sqrt((1 - expo) ** 2 + 4 * expo * thrust)) / (2 * expo)
+    value = np.zeros((len(time), 16))
+    value[:, :4] = (1000.0 + 1000.0 * (low + (high - low) * curve))[:, None]
+    return Series(time, np.rint(value))
+
+
+def flying(seconds: float = 120.0, **parts: object) -> Recording:
+    """A recording with throttle and outputs but no current."""
+    fast, slow = np.arange(0.0, seconds, 0.1), np.arange(0.0, seconds, 0.25)
+    percent = np.trunc(100.0 * thrust_at(slow)) / 100.0
+    recording = Flown(seconds=seconds).recording()
+    return replace(
+        recording,
+        current=None,
+        throttle=Series(slow, percent),
+        outputs=outputs(fast, thrust_at(fast)),
+        parameters=history(CURVE | LIMITS),
+        **parts,
+    )
+
+
+def test_a_throttle_cut_to_whole_per_cent_gets_its_mean_back():
+    recording = replace(flying(), outputs=None)
+    (control,) = controls(recording)
+    error = control.series.value - thrust_at(control.series.time)
+    assert abs(error.mean()) < 4 * 0.00289 / np.sqrt(len(error))
+
+
+@pytest.mark.parametrize("value", [0.0, 1.0])
+def test_no_throttle_and_full_throttle_are_exact(value):
+    still = Series(np.arange(10.0), np.array([value, 0.5] * 5))
+    (control,) = controls(replace(flying(), outputs=None, throttle=still))
+    assert control.series.value[0] == value
+
+
+def test_thrust_through_the_curve_is_the_thrust_demanded():
+    found = controls(flying())
+    assert [c.origin for c in found] == [
+        "reported throttle",
+        "motor outputs through the autopilot's thrust curve",
+    ]
+    exact = found[1].series
+    # Outputs are whole microseconds of 800: half of one is under 0.001 of thrust.
+    assert np.abs(exact.value - thrust_at(exact.time)).max() < 0.002
+
+
+def test_outputs_that_do_not_explain_the_throttle_are_not_taken_for_thrust():
+    recording = flying()
+    wrong = outputs(recording.outputs.time, 0.8 * thrust_at(recording.outputs.time))
+    origins = {c.origin for c in controls(replace(recording, outputs=wrong))}
+    assert "motor outputs through the autopilot's thrust curve" not in origins
+
+
+def test_motors_are_found_by_the_function_of_their_outputs():
+    recording = flying()
+    moved = np.zeros_like(recording.outputs.value)
+    moved[:, 8:12] = recording.outputs.value[:, :4]
+    moved[:, :4] = 1500.0
+    functions = {f"SERVO{n}_FUNCTION": 33.0 + n - 9 for n in range(9, 13)}
+    recording = replace(
+        recording,
+        outputs=Series(recording.outputs.time, moved),
+        parameters=history(CURVE | LIMITS | functions),
+    )
+    exact = controls(recording)[1].series
+    assert np.abs(exact.value - thrust_at(exact.time)).max() < 0.002
+
+
+def test_a_quantity_that_never_changes_is_none():
+    recording = flying()
+    flat = Series(recording.throttle.time, np.zeros(len(recording.throttle)))
+    assert controls(replace(recording, throttle=flat, outputs=None)) == ()
+
+
+def test_the_reported_form_is_what_the_autopilot_multiplies():
+    found = controls(flying())
+    assert reported(found) == {THROTTLE: found[0]}
+
+
+# --- a fast current, sampled slowly -------------------------------------------------------
+
+
+def fast_current(seed: int) -> tuple[Recording, np.ndarray, np.ndarray]:
+    """Outputs at 10 Hz that make a current, which is reported at 1.5 Hz; the truth at 10 Hz."""
+    rng = np.random.default_rng(seed)
+    seconds = 300.0
+    fast = np.arange(0.0, seconds, 0.1)
+    # One second's memory: what lies between two samples of the current cannot be interpolated.
+    drive = np.zeros(len(fast))
+    for k in range(1, len(fast)):
+        drive[k] = 0.8 * drive[k - 1] + rng.normal()
+    thrust = np.clip(0.4 + 0.06 * drive, 0.05, 0.95)
+    series = outputs(fast, thrust)
+    duty = (series.value[:, 0] - 1000.0) / 1000.0
+    true = 3.0 + 60.0 * duty**2
+    slow = np.arange(0, len(fast), 7)
+    recording = replace(
+        Flown(seconds=seconds).recording(),
+        current=Series(fast[slow], true[slow] + rng.normal(scale=0.2, size=len(slow))),
+        throttle=None,
+        outputs=series,
+        parameters=history(LIMITS),
+    )
+    return recording, fast, true
+
+
+def slope_against(control: Series, time: np.ndarray, true: np.ndarray) -> float:
+    """Slope of something proportional to the true current, regressed on a form of it."""
+    inside = slice(20, -20)
+    return float(np.polyfit(interpolate(control, time)[inside], true[inside], 1)[0])
+
+
+def test_a_current_rebuilt_from_the_outputs_does_not_bias_a_slope_where_interpolation_does():
+    interpolated, rebuilt = [], []
+    for seed in range(12):
+        recording, time, true = fast_current(seed)
+        found = controls(recording)
+        assert [c.kind for c in found] == [CURRENT, CURRENT]
+        assert found[1].origin == "battery current, rebuilt from the motor outputs"
+        interpolated.append(slope_against(found[0].series, time, true))
+        rebuilt.append(slope_against(found[1].series, time, true))
+    assert abs(np.mean(interpolated) - 1.0) > 0.02
+    assert np.mean(rebuilt) == pytest.approx(1.0, abs=0.01)
+
+
+def test_a_rebuilt_current_never_falls_below_nothing():
+    recording, _, _ = fast_current(0)
+    assert controls(recording)[1].series.value.min() >= 0.0
+
+
+def test_outputs_that_say_nothing_of_the_current_are_not_used():
+    recording, time, _ = fast_current(1)
+    rng = np.random.default_rng(9)
+    noise = outputs(time, np.clip(0.4 + 0.1 * rng.normal(size=len(time)), 0.05, 0.95))
+    assert [c.origin for c in controls(replace(recording, outputs=noise))] == ["battery current"]
