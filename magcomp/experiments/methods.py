@@ -40,6 +40,8 @@ class Corrections:
         The centres' feet on that line: the offsets the paper's method looks up, shape (3, 3).
     fit
         magcomp's own.
+    strength
+        Field strength the shapes were scaled to, mGauss.
     """
 
     samples: Samples
@@ -50,6 +52,7 @@ class Corrections:
     line: SpaceLine
     feet: FloatArray
     fit: MotorFit
+    strength: float
 
     def apply(self, method: str, raw: FloatArray, u: FloatArray, level: int) -> FloatArray:
         """Corrected field, mGauss, shape (n, 3).
@@ -111,4 +114,5 @@ def corrections(recording: Recording, compass: int, earth: EarthField) -> Correc
         line=line,
         feet=line.point + np.multiply.outer(line.positions(centres), line.direction),
         fit=fit,
+        strength=earth.strength,
     )
