@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from magcomp.align import controls, readings, reported
+from magcomp.align.sample import APPLIED_LATER_S
 from magcomp.autopilot import ardupilot
 from magcomp.earth import EarthField, expected_field
 from magcomp.fit import Problem
@@ -135,7 +136,7 @@ class Flown:
         for compass in self.compasses:
             raw = self.sensed_at(time - self.field_lag, compass)
             raw = raw + rng.normal(scale=self.noise, size=raw.shape)
-            now = self.current_at(time - self.current_lag)
+            now = self.current_at(time - self.current_lag - APPLIED_LATER_S)
             reported_field = np.empty_like(raw)
             for index, moment in enumerate(time):
                 calibration = ardupilot.calibration_at(history, compass, float(moment))
@@ -165,3 +166,40 @@ def problem_of(recording: Recording, compass: int = 1) -> Problem:
     """A compass of a recording against its first control quantity, earth field at HOME."""
     found = controls(recording)
     return Problem(readings(recording, compass), found[0], reported(found), earth())
+
+
+@dataclass(frozen=True)
+class Swept(Flown):
+    """A vehicle that stands still while the current goes up and down in steps."""
+
+    seconds: float = 100.0
+    heading: float = 0.7
+
+    def current_at(self, time: FloatArray) -> FloatArray:
+        """Steps of six seconds, 1 to 45 A and back."""
+        steps = np.array([1.0, 10.0, 20.0, 30.0, 45.0, 35.0, 25.0, 15.0, 5.0])
+        return steps[np.clip(time // 6.0, 0, None).astype(int) % len(steps)]
+
+    def attitude_at(self, time: FloatArray) -> FloatArray:
+        """Standing on legs of unequal length."""
+        return np.tile([0.02, -0.01, self.heading], (len(time), 1))
+
+
+@dataclass(frozen=True)
+class Turned(Flown):
+    """The paper's rig: turned about at each of several steady currents."""
+
+    seconds: float = 240.0
+    levels: tuple[float, ...] = (0.5, 20.0, 45.0)
+
+    def current_at(self, time: FloatArray) -> FloatArray:
+        """One level after the other."""
+        each = self.seconds / len(self.levels)
+        index = np.clip(time // each, 0, len(self.levels) - 1).astype(int)
+        return np.array(self.levels)[index]
+
+    def attitude_at(self, time: FloatArray) -> FloatArray:
+        """Slowly over most of the sphere."""
+        roll = 1.3 * np.sin(2 * np.pi * time / 23.0)
+        pitch = 0.9 * np.sin(2 * np.pi * time / 17.0)
+        return np.stack([roll, pitch, 2 * np.pi * time / 31.0], axis=1)

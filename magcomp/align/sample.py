@@ -12,6 +12,12 @@ from magcomp.model import Control, FloatArray, Lags, Readings, Samples, Series
 
 _RATE_STEP_S = 0.05
 
+APPLIED_LATER_S = 0.05
+"""The firmware corrects a reading with a control quantity this much older than what disturbed it:
+a reading is the mean over one update of 0.1 s, so it is centred 0.05 s ago, and it is corrected
+with the battery or throttle read one update, 0.1 s, ago (ArduCopter 4.6.3; the recording
+flight_wrong_mot shows it)."""
+
 
 def sample(
     readings: Readings, control: Control, in_force: Mapping[str, Control], lags: Lags
@@ -47,14 +53,15 @@ def sample(
     down_rate = (
         gravity_direction(after[:, 0], after[:, 1]) - gravity_direction(before[:, 0], before[:, 1])
     ) / (2 * _RATE_STEP_S)
-    raw, raw_rate = _undo(readings, in_force, commanded)
+    applied = commanded - APPLIED_LATER_S
+    raw, raw_rate = _undo(readings, in_force, applied)
     return Samples(
         compass=readings.compass,
         lags=lags,
         time=readings.time,
         raw=raw,
         raw_rate=raw_rate,
-        present=_as_now(readings, raw, in_force, commanded),
+        present=_as_now(readings, raw, in_force, applied),
         attitude=attitude,
         down=down,
         down_rate=down_rate,
@@ -76,7 +83,7 @@ def _rate(series: Series, time: FloatArray) -> FloatArray:
 
 
 def _undo(
-    readings: Readings, controls: Mapping[str, Control], commanded: FloatArray
+    readings: Readings, controls: Mapping[str, Control], applied: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Raw field and its change per second of regressor lag, both of shape (n, 3)."""
     raw = np.empty_like(readings.reported)
@@ -95,15 +102,15 @@ def _undo(
                 )
             series = controls[stretch.regressor].series
             motor = stretch.correction.motor
-            field = field - np.multiply.outer(interpolate(series, commanded[rows]), motor)
+            field = field - np.multiply.outer(interpolate(series, applied[rows]), motor)
             # d/dlag of −MOT·u(t − lag) is +MOT·u̇.
-            raw_rate[rows] = np.multiply.outer(_rate(series, commanded[rows]), motor) @ inverse.T
+            raw_rate[rows] = np.multiply.outer(_rate(series, applied[rows]), motor) @ inverse.T
         raw[rows] = field @ inverse.T - stretch.correction.offset
     return raw, raw_rate
 
 
 def _as_now(
-    readings: Readings, raw: FloatArray, controls: Mapping[str, Control], commanded: FloatArray
+    readings: Readings, raw: FloatArray, controls: Mapping[str, Control], applied: FloatArray
 ) -> FloatArray:
     """Every reading as the present correction would report it, shape (n, 3)."""
     present = readings.in_force[-1]
@@ -112,6 +119,6 @@ def _as_now(
     if rows.any():
         u = np.zeros(int(rows.sum()))
         if present.regressor is not None and present.regressor in controls:
-            u = interpolate(controls[present.regressor].series, commanded[rows])
+            u = interpolate(controls[present.regressor].series, applied[rows])
         field[rows] = present.correction.apply(raw[rows], u)
     return field
