@@ -1,0 +1,379 @@
+"""What to do next, in words: from what has been seen so far to one sentence. No I/O, no clock.
+
+Situations
+----------
+======== ============================================== =========================================
+GROUND   disarmed, and nothing recorded with motors on  say how to begin
+UNSURE   motors on, still on the ground, not yet known  turn it; no word of throttle
+STILL    motors on, does not turn                       steps of the throttle, *if tied down*
+HELD     motors on, tilted as nobody flies, on the spot turns at steady throttles
+FLYING   has risen or moves over the ground             turn, climb, descend; never a throttle
+======== ============================================== =========================================
+
+Rules
+-----
+1. A pilot in the air is never told a throttle, a bank or anything else that could cost
+   height: only to turn, to climb, to descend when high enough, and to land when it is enough.
+2. Once flying, a vehicle counts as flying until it is disarmed.
+3. Throttle is spoken of only to somebody who holds the vehicle or has tied it down.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from magcomp.buffer import BANDS, LEVELS, SECTORS, Coverage, sphere_cell
+from magcomp.model import Grade
+
+Vector = tuple[float, float, float]
+
+RISEN_M = 1.5
+MOVING = 1.5
+"""Metres above where it was armed, and m/s over the ground, that nobody holding it reaches."""
+
+TIPPED_RAD = math.radians(55.0)
+"""A tilt that a multirotor flown for calibration does not have."""
+
+TURNED_RAD = math.radians(30.0)
+"""A vehicle that turns less than this stands still."""
+
+STILL_S = 8.0
+
+LEVEL_ENOUGH = 0.3
+"""Share of the sphere at which a level is done: about three turns, one about each axis."""
+
+LEVELS_ENOUGH = 3
+STEPS_ENOUGH = 5
+STEP_S = 3.0
+FLIGHT_S = 60.0
+SECTORS_ENOUGH = SECTORS - 1
+THROTTLES_ENOUGH = 3
+_THROTTLE_SHARE_S = 2.0
+_HELD_LEVELS = (0, 2, 4, 3, 1, 5)
+_LOW_M = 8.0
+_STABLE_REFITS = 3
+
+
+class Situation(StrEnum):
+    """How the recording is being made; see the table at the top of the file."""
+
+    GROUND = "ground"
+    UNSURE = "unsure"
+    STILL = "still"
+    HELD = "held"
+    FLYING = "flying"
+
+
+@dataclass(frozen=True)
+class Guidance:
+    """What to do next.
+
+    Attributes
+    ----------
+    text
+        A sentence for the pilot, without full stop.
+    share_done
+        0 … 1.
+    enough
+        Nothing more is needed.
+    """
+
+    text: str
+    share_done: float
+    enough: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """What guidance is made of.
+
+    Attributes
+    ----------
+    situation
+        See :class:`SituationWatch`.
+    armed
+        None while unknown.
+    throttle
+        0 … 1; None while unknown.
+    attitude
+        Roll, pitch, yaw in radians; None while unknown.
+    height_m
+        Above home; None while unknown.
+    coverage
+        Attitudes seen at each throttle level.
+    seconds
+        Recorded with attitude.
+    grade
+        Of the newest analysis; None before the first.
+    stable_refits
+        Analyses in a row that said the same.
+    """
+
+    situation: Situation
+    armed: bool | None
+    throttle: float | None
+    attitude: Vector | None
+    height_m: float | None
+    coverage: Coverage
+    seconds: float
+    grade: Grade | None = None
+    stable_refits: int = 0
+
+
+class SituationWatch:
+    """Tells a vehicle that flies from one that is held or tied down.
+
+    Fed with what the vehicle says, a few times a second.
+    """
+
+    def __init__(self) -> None:
+        self.situation = Situation.GROUND
+        self._ground_m: float | None = None
+        self._tipped = False
+        self._armed_at: float | None = None
+        self._reference: Vector | None = None
+        self._turned = False
+
+    def update(
+        self,
+        now: float,
+        armed: bool | None,
+        attitude: Vector | None,
+        height_m: float | None,
+        speed: float | None,
+    ) -> Situation:
+        """Take one look; ``now`` in seconds."""
+        if not armed:
+            self._rest(height_m)
+            return self.situation
+        if self._armed_at is None:
+            self._armed_at, self._reference, self._turned = now, attitude, False
+        self._ground_m = height_m if self._ground_m is None else self._ground_m
+        if self.situation is Situation.FLYING or self._is_flying(height_m, speed):
+            self.situation = Situation.FLYING
+            return self.situation
+        self._look(attitude)
+        if self._tipped:
+            self.situation = Situation.HELD
+        elif self._turned or now - self._armed_at < STILL_S:
+            self.situation = Situation.UNSURE
+        else:
+            self.situation = Situation.STILL
+        return self.situation
+
+    def _rest(self, height_m: float | None) -> None:
+        self._ground_m = height_m
+        if self._armed_at is None:
+            return
+        self._armed_at = None
+        if self.situation is Situation.UNSURE:
+            self.situation = Situation.GROUND
+
+    def _is_flying(self, height_m: float | None, speed: float | None) -> bool:
+        risen = None not in (height_m, self._ground_m) and (
+            (height_m or 0.0) - (self._ground_m or 0.0) > RISEN_M
+        )
+        return risen or (speed is not None and speed > MOVING)
+
+    def _look(self, attitude: Vector | None) -> None:
+        if attitude is None:
+            return
+        if self._reference is None:
+            self._reference = attitude
+        turned = (
+            abs(math.remainder(new - old, math.tau))
+            for new, old in zip(attitude, self._reference, strict=True)
+        )
+        self._turned = self._turned or max(turned) > TURNED_RAD
+        tilt = math.acos(math.cos(attitude[0]) * math.cos(attitude[1]))
+        self._tipped = self._tipped or tilt > TIPPED_RAD
+
+
+def guide(view: View) -> Guidance:
+    """Say what to do next.
+
+    Notes
+    -----
+    See the rules at the top of the file.
+    """
+    match view.situation:
+        case Situation.FLYING:
+            return _guide_flight(view)
+        case Situation.HELD:
+            return _guide_held(view)
+        case Situation.STILL:
+            return _guide_still(view)
+        case Situation.UNSURE:
+            return Guidance(f"keep the throttle as it is and {_turn(view)}", 0.0)
+        case _:
+            return _guide_ground(view)
+
+
+def is_settled(view: View) -> bool:
+    """Whether the judge is content and has been for a while."""
+    return view.grade is Grade.GOOD and view.stable_refits >= _STABLE_REFITS
+
+
+def level_seconds(view: View) -> tuple[float, ...]:
+    """Seconds recorded at each throttle level."""
+    return tuple((view.coverage.share * view.seconds).tolist())
+
+
+def levels_done(coverage: Coverage) -> tuple[int, ...]:
+    """Throttle levels whose attitudes are enough for an ellipsoid."""
+    return tuple(np.flatnonzero(coverage.fraction >= LEVEL_ENOUGH).tolist())
+
+
+def _guide_ground(view: View) -> Guidance:
+    if view.attitude is None:
+        return Guidance("waiting for the vehicle's attitude", 0.0)
+    return Guidance(
+        "arm and fly: turns, climbs and descents; or hold it on a stand without propellers and "
+        "turn it about every axis at three steady throttles",
+        0.0,
+    )
+
+
+# -------------------------------------------------------------------------- flying
+
+
+def _guide_flight(view: View) -> Guidance:
+    sectors = _sectors(view)
+    throttles = sum(seconds >= _THROTTLE_SHARE_S for seconds in level_seconds(view))
+    shares = (
+        min(len(sectors) / SECTORS_ENOUGH, 1.0),
+        min(throttles / THROTTLES_ENOUGH, 1.0),
+        min(view.seconds / FLIGHT_S, 1.0),
+        min(view.stable_refits / _STABLE_REFITS, 1.0) if view.grade is Grade.GOOD else 0.0,
+    )
+    share = float(np.mean(shares))
+    if min(shares) >= 1.0:
+        return Guidance(_ending(view), 1.0, enough=True)
+    if not view.armed:
+        return Guidance("this flight was not enough: fly once more with turns and climbs", share)
+    if shares[0] < 1.0 and shares[0] <= shares[1]:
+        return Guidance(_turn(view), share)
+    if shares[1] < 1.0:
+        return Guidance(_climb_or_descend(view), share)
+    if shares[0] < 1.0:
+        return Guidance(_turn(view), share)
+    return Guidance(f"keep flying: {_turn_more(view)} and {_climb_or_descend(view)}", share)
+
+
+def _climb_or_descend(view: View) -> str:
+    """Climbing needs more throttle than hovering, descending less: both ends are wanted."""
+    if view.height_m is None or view.height_m < _LOW_M:
+        return "climb"
+    seconds = level_seconds(view)
+    hover = int(np.argmax(seconds[1:])) + 1 if any(seconds[1:]) else 0
+    return "climb" if sum(seconds[hover + 1 :]) <= sum(seconds[1:hover]) else "descend"
+
+
+# -------------------------------------------------------------------------- held
+
+
+def _guide_held(view: View) -> Guidance:
+    fraction = view.coverage.fraction
+    done = levels_done(view.coverage)
+    best = np.sort(np.minimum(fraction / LEVEL_ENOUGH, 1.0))[::-1][:LEVELS_ENOUGH]
+    share = 0.9 * float(best.sum()) / LEVELS_ENOUGH
+    if len(done) >= LEVELS_ENOUGH:
+        share += 0.1 * min(view.stable_refits / _STABLE_REFITS, 1.0)
+        if is_settled(view):
+            return Guidance(_ending(view), 1.0, enough=True)
+    level = _level(view)
+    if level in done:
+        wanted = next((each for each in _HELD_LEVELS if each not in done), None)
+        if wanted is None:
+            return Guidance(f"{_turn(view)} at this throttle", share)
+        return Guidance(_throttle_to(wanted, level), share)
+    return Guidance(f"hold the throttle and {_held_motion(view, level)}", share)
+
+
+def _held_motion(view: View, level: int) -> str:
+    cells = view.coverage.counts[level].reshape(BANDS, SECTORS) > 0
+    if cells.any(axis=0).sum() < SECTORS_ENOUGH:
+        return _turn(view, level)
+    above, below = cells[: BANDS // 2].sum(), cells[BANDS // 2 :].sum()
+    if above >= below:
+        return "lay it on its side and turn it slowly right round"
+    if (cells.sum() % 2) == 0:
+        return "tilt the nose down and turn it slowly over"
+    return "lay it on its side and turn it slowly right over"
+
+
+def _throttle_to(wanted: int, level: int) -> str:
+    verb = "raise" if wanted > level else "lower"
+    return f"{verb} the throttle to {100 * wanted // LEVELS} % and hold"
+
+
+# -------------------------------------------------------------------------- still
+
+
+def _guide_still(view: View) -> Guidance:
+    seconds = level_seconds(view)
+    done = [level for level, time in enumerate(seconds) if time >= STEP_S]
+    share = 0.9 * min(len(done) / STEPS_ENOUGH, 1.0)
+    if len(done) >= STEPS_ENOUGH:
+        share += 0.1 * min(view.stable_refits / _STABLE_REFITS, 1.0)
+        if is_settled(view):
+            return Guidance(_ending(view), 1.0, enough=True)
+    level = _level(view)
+    if level not in done:
+        return Guidance("hold the throttle where it is", share)
+    wanted = next((each for each in range(STEPS_ENOUGH) if each not in done), None)
+    if wanted is None:
+        wanted = min(done[-1] + 1, LEVELS // 2 + 1) if level < done[-1] else 0
+    if wanted == level:
+        return Guidance("hold the throttle where it is", share)
+    return Guidance(f"only if it is tied down: {_throttle_to(wanted, level)}", share)
+
+
+# -------------------------------------------------------------------------- all
+
+
+def _ending(view: View) -> str:
+    if not view.armed:
+        return "that is enough"
+    if view.situation is Situation.FLYING:
+        return "that is enough: land and disarm to write"
+    return "that is enough: lower the throttle and disarm to write"
+
+
+def _level(view: View) -> int:
+    return min(int((view.throttle or 0.0) * LEVELS), LEVELS - 1)
+
+
+def _sectors(view: View, level: int | None = None) -> set[int]:
+    counts = view.coverage.counts if level is None else view.coverage.counts[level]
+    seen = counts.reshape(-1, BANDS, SECTORS).any(axis=(0, 1))
+    return set(np.flatnonzero(seen).tolist())
+
+
+def _turn(view: View, level: int | None = None) -> str:
+    """Turn towards the nearest direction not yet seen.
+
+    Notes
+    -----
+    Turning right by an angle turns the field to the left by it, in body axes: to lower sectors.
+    """
+    if view.attitude is None:
+        return "turn slowly"
+    missing = set(range(SECTORS)) - _sectors(view, level)
+    here = _sector(view.attitude[2])
+    right = next((step for step in range(SECTORS) if (here - step) % SECTORS in missing), 0)
+    left = next((step for step in range(SECTORS) if (here + step) % SECTORS in missing), 0)
+    return f"turn slowly to the {'right' if right <= left else 'left'}"
+
+
+def _turn_more(view: View) -> str:
+    return _turn(view).replace("slowly ", "")
+
+
+def _sector(yaw: float) -> int:
+    """Sector of a level, northward field at a heading."""
+    return sphere_cell(math.cos(yaw), -math.sin(yaw), 0.0) % SECTORS

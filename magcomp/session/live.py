@@ -1,0 +1,509 @@
+"""A live vehicle from the first heartbeat to the verified write, without a user interface.
+
+``LiveSession`` owns the link, the recorder and the buffer. Its threads find and
+prepare the vehicle, watch what happens, and refit; everything it shows is frozen.
+A terminal interface draws ``snapshot()`` and calls the rest.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+
+from magcomp.buffer import Buffer
+from magcomp.errors import LinkError, LinkTimeoutError, MagcompError
+from magcomp.link import (
+    DEFAULT_RATES,
+    Connection,
+    GapEnded,
+    GapStarted,
+    LinkEvent,
+    Recorder,
+    Replay,
+    VehicleFound,
+    VehicleRebooted,
+    connect,
+)
+from magcomp.link.clock import Clock, SystemClock
+from magcomp.model import Analysis, ParameterSet, Recording, Vehicle
+from magcomp.parameters.events import Event, Outcome
+from magcomp.parameters.plan import WritePlan, relevant_names
+from magcomp.parameters.writer import fetch
+from magcomp.session.analyse import Options, Progress, analyse
+from magcomp.session.guide import (
+    Guidance,
+    SituationWatch,
+    View,
+    guide,
+    level_seconds,
+    levels_done,
+)
+from magcomp.session.latest import Latest, Now
+from magcomp.session.refit import DEFAULT_SHARE, Refit, Refitter
+from magcomp.session.snapshot import LiveSnapshot, compasses_now, warnings
+from magcomp.session.tap import Tap
+from magcomp.session.upload import finish_restore, make_plan, read_backup, wait_disarmed, write_plan
+
+_LOOK_S = 0.2
+_STREAMS_S = 6.0
+_MOTOR_NAMES = (
+    *(f"MOT_{name}" for name in ("THST_EXPO", "SPIN_MIN", "SPIN_MAX", "PWM_MIN", "PWM_MAX")),
+    *(f"SERVO{n}_FUNCTION" for n in range(1, 17)),
+    *("COMPASS_LEARN", "COMPASS_USE", "COMPASS_USE2", "COMPASS_USE3", "BATT_MONITOR"),
+)
+_NOTHING = Now(0, None, {}, (), None, None, None, None, None, None, False)
+
+
+def _silent(_: object) -> None:
+    pass
+
+
+def _never() -> bool:
+    return False
+
+
+class LiveSession:
+    """A live vehicle. Use as a context manager, made with ``open``.
+
+    Methods may be called from any thread. Those that speak with the vehicle
+    (``upload_plan``, ``upload``, ``restore_plan``) block, one at a time.
+
+    Parameters
+    ----------
+    connection
+        The link; the session closes it.
+    tap
+        Takes every frame of it.
+    clock
+        The computer's clocks unless given.
+    rates
+        Message name to Hz.
+    options
+        What the refits fit.
+    refit_share
+        Share of one core that refitting may take; 0 for none.
+    """
+
+    def __init__(
+        self,
+        connection: Connection,
+        tap: Tap,
+        *,
+        clock: Clock,
+        rates: Mapping[str, float],
+        options: Options,
+        refit_share: float,
+    ) -> None:
+        self.connection = connection
+        self._tap = tap
+        self._clock = clock
+        self._rates = rates
+        self._opened = clock.monotonic()
+        self._asked = threading.Lock()
+        self._ready = threading.Event()
+        self._stop = threading.Event()
+        self._streaming_since: float | None = None
+        self._situation = SituationWatch()
+        self._notes: list[str] = []
+        self._trouble = ""
+        self._failure: MagcompError | None = None
+        self._threads = [
+            threading.Thread(target=work, name=f"magcomp-{name}", daemon=True)
+            for name, work in (("prepare", self._prepare), ("watch", self._watch))
+        ]
+        for thread in self._threads:
+            thread.start()
+        self._refitter = (
+            Refitter(self._prepared_recording, options, share=refit_share) if refit_share else None
+        )
+
+    @classmethod
+    def open(
+        cls,
+        address: str,
+        *,
+        record: Path | None = None,
+        force: bool = False,
+        system: int | None = None,
+        baud: int | None = None,
+        signing_key: bytes | None = None,
+        clock: Clock | None = None,
+        rates: Mapping[str, float] = DEFAULT_RATES,
+        options: Options | None = None,
+        refit_share: float = DEFAULT_SHARE,
+    ) -> LiveSession:
+        """Open an address; returns at once, see ``wait_ready``.
+
+        Parameters
+        ----------
+        address
+            A connection string as in ``magcomp.link.address``; a .tlog is replayed.
+        record
+            Write all that arrives into this .tlog.
+        force
+            Overwrite it.
+        system, baud, signing_key
+            See ``magcomp.link.connect``; the key is 32 bytes from ``read_signing_key``.
+        clock, rates, options, refit_share
+            See the class.
+
+        Raises
+        ------
+        AddressError, LinkError
+            The address is none, or cannot be opened.
+        OutputError
+            The recording cannot be made.
+        LogError
+            The log to replay is none.
+        """
+        recorder = None if record is None else Recorder(record, force=force)
+        tap = Tap(Buffer(address), Latest(), recorder)
+        try:
+            connection = connect(
+                address, baud=baud, system=system, key=signing_key, sinks=[tap], clock=clock
+            )
+        except MagcompError:
+            tap.discard()
+            raise
+        return cls(
+            connection,
+            tap,
+            clock=clock or SystemClock(),
+            rates=rates,
+            options=options or Options(),
+            refit_share=refit_share,
+        )
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    # ---------------------------------------------------------------- waiting
+
+    def wait_ready(self, timeout: float = 10.0) -> Vehicle:
+        """Wait until the vehicle is found, then until its calibration is read.
+
+        Parameters
+        ----------
+        timeout
+            Seconds for the vehicle to be found; reading takes what it takes.
+
+        Raises
+        ------
+        LinkTimeoutError
+            No vehicle in time; says what arrived instead. Or it does not send its parameters.
+        LinkError
+            Several vehicles and none chosen, or the link is lost for good.
+        """
+        vehicle = self.connection.wait_vehicle(timeout)
+        while not self._ready.wait(_LOOK_S):
+            if self._stop.is_set():
+                raise LinkError(f"The connection to {self.connection.address} is closed.")
+        if self._failure is not None:
+            raise self._failure
+        return self.connection.vehicle or vehicle
+
+    # ---------------------------------------------------------------- what is shown
+
+    def snapshot(self) -> LiveSnapshot:
+        """Everything a screen shows, now. Costs well under a millisecond."""
+        vehicle = self.connection.vehicle
+        latest = self._tap.latest
+        now = _NOTHING if vehicle is None else latest.now(vehicle)
+        parameters = {} if vehicle is None else latest.parameters(vehicle)
+        link, refit = self.connection.statistics(), self.refit
+        view = self._view(now)
+        return LiveSnapshot(
+            address=str(self.connection.address),
+            vehicle=vehicle,
+            connected=link.up,
+            link_text=self._link_text(vehicle, link.up),
+            armed=now.armed,
+            elapsed_s=self.elapsed_s,
+            recording_path=self._tap.path,
+            recording_bytes=self._tap.size,
+            recording=self._tap.taking and not self._tap.failure,
+            link=link,
+            compasses=compasses_now(now, parameters, refit.analysis),
+            throttle=now.throttle,
+            current=now.current,
+            voltage=now.voltage,
+            attitude_deg=_degrees(now),
+            height_m=now.height_m,
+            coverage=view.coverage,
+            levels_done=levels_done(view.coverage),
+            level_seconds=level_seconds(view),
+            situation=view.situation,
+            guidance=self._guidance(vehicle, view),
+            warnings=self._warnings(now, vehicle, parameters),
+            analysis=refit.analysis,
+            grade=view.grade,
+            stable_refits=refit.stable,
+            fit_trouble=refit.trouble,
+            ready=self._ready.is_set(),
+            ended=self.connection.ended,
+        )
+
+    @property
+    def vehicle(self) -> Vehicle | None:
+        """The vehicle as far as known."""
+        return self.connection.vehicle
+
+    @property
+    def analysis(self) -> Analysis | None:
+        """The newest refit; None before the first."""
+        return self.refit.analysis
+
+    @property
+    def refit(self) -> Refit:
+        """How the refitting stands."""
+        return Refit() if self._refitter is None else self._refitter.state
+
+    @property
+    def elapsed_s(self) -> float:
+        """Seconds since the session was opened; of the log, where one is replayed."""
+        if isinstance(self.connection.address, Replay):
+            return self._tap.latest.span_s
+        return self._clock.monotonic() - self._opened
+
+    @property
+    def armed(self) -> bool | None:
+        """What the newest heartbeat says; None where the vehicle is not heard."""
+        vehicle = self.connection.vehicle
+        if vehicle is None or not self.connection.statistics().up:
+            return None
+        return self._tap.latest.now(vehicle).armed
+
+    # ---------------------------------------------------------------- the answer
+
+    def recording(self) -> Recording:
+        """All that has been received so far, as a log reader would give it.
+
+        Raises
+        ------
+        LogError
+            No vehicle has been heard yet.
+        """
+        vehicle = self.connection.vehicle
+        return self._tap.buffer.snapshot(None if vehicle is None else vehicle.system)
+
+    def analyse(
+        self, options: Options | None = None, progress: Progress = lambda _what, _share: None
+    ) -> Analysis:
+        """Fit and judge what has been received so far; see ``magcomp.session.analyse``.
+
+        Raises
+        ------
+        InputError
+            There is too little for a fit.
+        """
+        return analyse(self.recording(), options, progress)
+
+    def stop_recording(self) -> None:
+        """Take no more frames into buffer and file; the file is closed. The link stays."""
+        if self._refitter is not None:
+            self._refitter.close()
+        self._tap.stop()
+
+    # ---------------------------------------------------------------- writing
+
+    def upload_plan(self, wanted: ParameterSet, any_vehicle: bool = False) -> WritePlan:
+        """Read the vehicle's calibration and compare; see ``session.upload.make_plan``."""
+        with self._asked:
+            return make_plan(
+                self.connection, self._known_vehicle(), wanted, any_vehicle=any_vehicle
+            )
+
+    def restore_plan(self, backup: Path, any_vehicle: bool = False) -> WritePlan:
+        """Compare the vehicle with a backup.
+
+        Raises
+        ------
+        ParameterFileError
+            The backup is missing or none; otherwise as ``upload_plan``.
+        """
+        return self.upload_plan(read_backup(backup)[0], any_vehicle)
+
+    def upload(
+        self,
+        plan: WritePlan,
+        backup_path: Path,
+        on_event: Callable[[Event], None] = _silent,
+        stop: Callable[[], bool] = _never,
+    ) -> Outcome:
+        """Write and verify a plan, or put everything back; nothing while armed.
+
+        See ``magcomp.parameters.writer.write``; ``raise_for_failure`` makes words of the outcome.
+        """
+        with self._asked:
+            return write_plan(
+                plan,
+                self.connection,
+                self._tap.latest,
+                backup=backup_path,
+                clock=self._clock.monotonic,
+                unix_us=self._clock.unix_us,
+                on_event=on_event,
+                stop=stop,
+            )
+
+    def restore(
+        self,
+        backup: Path,
+        plan: WritePlan,
+        backup_path: Path,
+        on_event: Callable[[Event], None] = _silent,
+        stop: Callable[[], bool] = _never,
+    ) -> Outcome:
+        """Write the plan that ``restore_plan(backup)`` made, and note it in the journal."""
+        outcome = self.upload(plan, backup_path, on_event, stop)
+        if outcome.good:
+            finish_restore(backup)
+        return outcome
+
+    def wait_disarmed(
+        self,
+        seconds: float,
+        tell: Callable[[str], None] = _silent,
+        stop: Callable[[], bool] = _never,
+    ) -> None:
+        """Wait until the vehicle is disarmed; see ``session.upload.wait_disarmed``."""
+        wait_disarmed(lambda: self.armed, seconds=seconds, tell=tell, stop=stop)
+
+    def close(self) -> None:
+        """Restore the stream rates, close link and file. Closing twice is harmless."""
+        self._stop.set()
+        if self._refitter is not None:
+            self._refitter.close()
+        self.connection.close()
+        for thread in self._threads:
+            thread.join()
+        self._tap.stop()
+
+    # ---------------------------------------------------------------- the threads
+
+    def _prepare(self) -> None:
+        """Find the vehicle, ask for its streams, read its calibration."""
+        try:
+            vehicle = self._wait_for_vehicle()
+            if vehicle is not None and not isinstance(self.connection.address, Replay):
+                with self._asked:
+                    self.connection.request_streams(self._rates, _STREAMS_S)
+                    self._streaming_since = self._clock.monotonic()
+                    self._read_calibration(vehicle)
+        except MagcompError as error:
+            self._failure = error
+            self._trouble = str(error)
+        self._ready.set()
+
+    def _wait_for_vehicle(self) -> Vehicle | None:
+        while not self._stop.is_set() and not self.connection.ended:
+            try:
+                return self.connection.wait_vehicle(1.0)
+            except LinkTimeoutError as error:
+                self._trouble = str(error)
+        return None
+
+    def _read_calibration(self, vehicle: Vehicle) -> None:
+        names = (*relevant_names(vehicle.autopilot, ParameterSet({})), *_MOTOR_NAMES)
+        self.connection.discard()
+        fetch(self.connection, vehicle, names, clock=time.monotonic)
+
+    def _watch(self) -> None:
+        while not self._stop.wait(_LOOK_S):
+            for event in self.connection.take_events():
+                self._take(event)
+            vehicle = self.connection.vehicle
+            if vehicle is None:
+                continue
+            now = self._tap.latest.now(vehicle)
+            self._situation.update(self.elapsed_s, now.armed, now.attitude, now.height_m, now.speed)
+
+    def _take(self, event: LinkEvent) -> None:
+        match event:
+            case GapStarted():
+                self._note("the link was lost")
+            case GapEnded(duration=duration):
+                self._note(f"the link was gone for {duration:.0f} s")
+            case VehicleRebooted():
+                self._note("the vehicle rebooted")
+            case VehicleFound():
+                self._trouble = ""
+
+    def _note(self, text: str) -> None:
+        self._notes = [*self._notes[-4:], text]
+
+    # ---------------------------------------------------------------- inside
+
+    def _prepared_recording(self) -> Recording:
+        if not self._ready.is_set():
+            raise LinkError("the vehicle's calibration is still being read")
+        return self.recording()
+
+    def _known_vehicle(self) -> Vehicle:
+        vehicle = self.connection.vehicle
+        if vehicle is None:
+            raise LinkTimeoutError(f"No vehicle is on {self.connection.address}.")
+        return vehicle
+
+    def _view(self, now: Now) -> View:
+        refit = self.refit
+        return View(
+            situation=self._situation.situation,
+            armed=now.armed,
+            throttle=now.throttle,
+            attitude=now.attitude,
+            height_m=now.height_m,
+            coverage=self._tap.buffer.coverage(),
+            seconds=self._tap.seconds,
+            grade=None if refit.analysis is None else refit.analysis.grade,
+            stable_refits=refit.stable,
+        )
+
+    def _guidance(self, vehicle: Vehicle | None, view: View) -> Guidance:
+        if vehicle is None:
+            return Guidance("waiting for the vehicle's heartbeat", 0.0)
+        if not self._ready.is_set():
+            return Guidance("reading the vehicle's calibration", 0.0)
+        return guide(view)
+
+    def _link_text(self, vehicle: Vehicle | None, up: bool) -> str:
+        if vehicle is None:
+            return self._trouble or "waiting for a heartbeat"
+        if not up:
+            return "the link is lost; trying again"
+        return self._trouble or "connected"
+
+    def _warnings(
+        self, now: Now, vehicle: Vehicle | None, parameters: Mapping[str, float]
+    ) -> tuple[str, ...]:
+        if vehicle is None:
+            return ()
+        since = self._streaming_since
+        streaming = 0.0 if since is None else self._clock.monotonic() - since
+        found = [*warnings(now, vehicle, parameters, streaming), *reversed(self._notes)]
+        if self._failure is not None:
+            found.insert(0, str(self._failure).rstrip("."))
+        if self._tap.failure:
+            found.insert(0, self._tap.failure.rstrip("."))
+        return tuple(found)
+
+
+def _degrees(now: Now) -> tuple[float, float, float] | None:
+    if now.attitude is None:
+        return None
+    roll, pitch, yaw = np.degrees(now.attitude).tolist()
+    return roll, pitch, yaw % 360.0
