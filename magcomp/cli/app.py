@@ -28,6 +28,8 @@ COMMANDS = {
     "fit": _Command("magcomp.cli.fit", "Find the compensation in a log, judge it, write it."),
     "check": _Command("magcomp.cli.check", "Judge the calibration in force; fit nothing."),
     "report": _Command("magcomp.cli.report", "Fit a log and write a report to look at."),
+    "heading": _Command("magcomp.cli.heading", "Raw, corrected and gyro-fused heading of a log."),
+    "reproduce": _Command("magcomp.cli.reproduce", "Carry out the paper's experiments again."),
     "demo": _Command("magcomp.cli.demo", "Fit a recorded flight whose truth is known."),
 }
 
