@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 import numpy as np
@@ -278,13 +278,16 @@ class CompassResult:
     Attributes
     ----------
     parameters
-        Exactly what would be written; empty where the fit was rejected.
+        Exactly what would be written.
+    insisted
+        What would be written if the user insists on a rejected fit.
     """
 
     fit: MotorFit
     verdict: Verdict
     in_force: Correction
     parameters: Mapping[str, float]
+    insisted: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

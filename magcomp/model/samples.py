@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -177,6 +177,5 @@ class Samples:
 
     def where(self, keep: BoolArray) -> Samples:
         """The rows for which ``keep`` is true."""
-        columns = ("time", "raw", "raw_rate", "present", "attitude", "down")
-        columns += ("down_rate", "u", "u_rate")
+        columns = (f.name for f in fields(self) if f.name not in ("compass", "lags"))
         return replace(self, **{name: getattr(self, name)[keep] for name in columns})

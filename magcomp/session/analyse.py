@@ -24,7 +24,7 @@ from magcomp.model import (
     Recording,
     Verdict,
 )
-from magcomp.session.emit import emit
+from magcomp.session.emit import emit, emit_anyway
 
 REGRESSORS = ("auto", CURRENT, THROTTLE, "motors")
 
@@ -121,6 +121,7 @@ def analyse(
     parameters = emit(
         recording, [(j.fit, j.verdict, j.problem.readings.in_force[-1]) for j in judged[chosen]]
     )
+    insisted = emit_anyway(recording, [j.fit for j in judged[chosen]])
     return Analysis(
         source=recording.source,
         duration_s=recording.duration_s,
@@ -131,6 +132,7 @@ def analyse(
                 verdict=j.verdict,
                 in_force=j.problem.readings.in_force[-1].correction,
                 parameters=parameters[j.fit.compass],
+                insisted=insisted[j.fit.compass],
             )
             for j in judged[chosen]
         ),
@@ -227,6 +229,11 @@ def _compasses(recording: Recording, wanted: Options) -> list[int]:
     -----
     COMPASS_PMOT_EN overrides COMPASS_MOTCT for compass 1 (AUTOPILOTS.md).
     """
+    if recording.vehicle.autopilot != "ardupilot":
+        raise MissingDataError(
+            f"{recording.source} must be of a vehicle with ArduPilot; instead it is of one with "
+            f"{recording.vehicle.autopilot}, whose compass correction is not known yet"
+        )
     if not recording.field:
         raise MissingDataError(
             f"{recording.source} must hold readings of a compass (RAW_IMU, SCALED_IMU2 or "

@@ -19,7 +19,7 @@ def emit(
     Parameters
     ----------
     recording
-        Tells which parameters this vehicle has.
+        Tells which parameters this vehicle has, and their values.
     results
         Fit, verdict and what was in force, a compass each, all against one control quantity.
 
@@ -27,16 +27,18 @@ def emit(
     -------
     mapping of compass to parameters
         A whole correction for each compass: motor vector, offsets re-centred for it, soft iron.
-        COMPASS_MOTCT stands with every compass, because it is one switch for all. A rejected
-        compass whose stored motor vector would come into force with the switch gets zeros.
-        Empty where every compass is rejected: then the switch is not touched either.
+        COMPASS_MOTCT is one switch for all, so it stands with every compass, and with it zeros
+        for the stored motor vectors of compasses that were not fitted and would come into force.
+        A rejected compass gets zeros likewise. Empty where every compass is rejected: then the
+        switch is not touched either.
     """
     if all(verdict.grade is Grade.REJECTED for _, verdict, _ in results):
         return {fit.compass: {} for fit, _, _ in results}
+    fitted = [fit.compass for fit, _, _ in results]
     return {
         fit.compass: _for_this_vehicle(
             recording,
-            _accepted(recording, fit)
+            _accepted(recording, fit, fitted)
             if verdict.grade is not Grade.REJECTED
             else _neutral(fit, in_force),
         )
@@ -44,15 +46,35 @@ def emit(
     }
 
 
-def _accepted(recording: Recording, fit: MotorFit) -> dict[str, float]:
+def emit_anyway(recording: Recording, fits: Sequence[MotorFit]) -> Mapping[int, dict[str, float]]:
+    """Parameters of each compass whatever the verdict, for a user who insists."""
+    fitted = [fit.compass for fit in fits]
+    return {
+        fit.compass: _for_this_vehicle(recording, _accepted(recording, fit, fitted)) for fit in fits
+    }
+
+
+def _accepted(recording: Recording, fit: MotorFit, fitted: Sequence[int]) -> dict[str, float]:
     scale_name = f"COMPASS_SCALE{ardupilot.suffix(fit.compass)}"
     scale = recording.parameters.last(scale_name, 1.0)
     used = scale if 1 / ardupilot.SCALE_LIMIT <= scale <= ardupilot.SCALE_LIMIT else 1.0
-    switch = ardupilot.COMPENSATION_OF[fit.regressor]
     return {
-        ardupilot.COMPENSATION_SWITCH: float(switch),
+        **_switch(recording, fit, fitted),
         **ardupilot.correction_parameters(fit.correction, fit.compass, used),
     }
+
+
+def _switch(recording: Recording, fit: MotorFit, fitted: Sequence[int]) -> dict[str, float]:
+    """COMPASS_MOTCT, and zeros for what it would wake up on compasses that were not fitted."""
+    name, value = ardupilot.COMPENSATION_SWITCH, float(ardupilot.COMPENSATION_OF[fit.regressor])
+    parameters = {name: value}
+    if recording.parameters.last(name, 0.0) == value:
+        return parameters
+    for compass in range(1, ardupilot.COMPASS_COUNT + 1):
+        stored = [recording.parameters.last(n, 0.0) for n in ardupilot.vector_names("MOT", compass)]
+        if compass not in fitted and any(stored):
+            parameters |= ardupilot.vector_parameters("MOT", compass, np.zeros(3))
+    return parameters
 
 
 def _neutral(fit: MotorFit, in_force: InForce) -> dict[str, float]:
@@ -83,13 +105,7 @@ def parameter_set(analysis: Analysis, *, include_rejected: bool = False) -> Para
     """
     values: dict[str, float] = {}
     for result in analysis.compasses:
-        values.update(result.parameters)
-        if include_rejected and result.verdict.grade is Grade.REJECTED:
-            switch = ardupilot.COMPENSATION_OF[result.fit.regressor]
-            values[ardupilot.COMPENSATION_SWITCH] = float(switch)
-            values.update(
-                ardupilot.correction_parameters(result.fit.correction, result.fit.compass, 1.0)
-            )
+        values.update(result.insisted if include_rejected else result.parameters)
     ordered = {name: values[name] for name in sorted(values, key=_order)}
     return ParameterSet(ordered, analysis.vehicle, tuple(_comments(analysis)))
 
