@@ -16,10 +16,7 @@ from magcomp.report.html_page import canvas, page
 from magcomp.report.html_parts import DASH, Numbers, table, text
 
 _TITLE = "Three-axis compass correction under varying control quantity, reproduced"
-_SIDE_BY_SIDE = (
-    "display:grid;grid-template-columns:repeat(auto-fit,minmax(19rem,1fr));gap:1rem 2rem"
-)
-_ROWS = (
+_COLUMNS = (
     ("uncorrected", "uncorrected_deg", "uncorrected_deg"),
     ("ellipsoid only", "ellipsoid_deg", "ellipsoid_deg"),
     ("the paper’s method", "paper_deg", "method_deg"),
@@ -56,7 +53,7 @@ def html(made: Reproduction) -> str:
         f'<header><p class="overline">magcomp {__version__} reproduce</p>'
         f"<h1><span>{text(_TITLE)}</span></h1></header><main>"
         f"{_summary(numbers, done)}"
-        f"<section><h2>Table 1</h2><p>{text(TURN)}</p>{_tables(numbers, done)}{_methods()}"
+        f"<section><h2>Table 1</h2><p>{text(TURN)}</p>{_table(numbers, done)}{_methods()}"
         "</section>"
         f"<section><h2>The flights</h2><p>{text(FLIGHT)}</p>{_flights(numbers, done)}</section>"
         + "".join(_pictures(name, done[name], drawn[name]) for name in done)
@@ -88,37 +85,28 @@ def _capital(words: str) -> str:
     return words[0].upper() + words[1:]
 
 
-def _tables(numbers: Numbers, done: Mapping[str, Experiments]) -> str:
-    tables = _table(numbers, "paper", "The paper") + "".join(
-        _table(numbers, name, _capital(KINDS[name])) for name in done
-    )
-    return f'<div style="{_SIDE_BY_SIDE}">{tables}</div>'
-
-
-def _table(numbers: Numbers, kind: str, caption: str) -> str:
-    count = range(len(numbers.at(kind)))
-    head = [
-        "heading error, °",
-        *(
-            f"{numbers.show(kind, row, 'control', decimals=0)} ‰, "
-            f"{numbers.show(kind, row, 'current_a', decimals=0)} A"
-            for row in count
-        ),
-    ]
+def _table(numbers: Numbers, done: Mapping[str, Experiments]) -> str:
+    """A row for each control quantity of the paper and of each kind of vehicle."""
+    names = {"paper": "The paper", **{name: _capital(KINDS[name]) for name in done}}
+    head = ["", "control, ‰", "current, A", *(name for name, _, _ in _COLUMNS)]
     rows = []
-    for label, ours, papers in _ROWS:
-        key = papers if kind == "paper" else ours
-        cells = [
-            DASH if key is None else numbers.show(kind, row, key, decimals=_decimals(numbers, kind))
-            for row in count
-        ]
-        rows.append([label, *cells])
-    return table(head, rows, text(caption), "numbers")
-
-
-def _decimals(numbers: Numbers, kind: str) -> int:
-    """As many as the paper prints; ours are finer."""
-    return 1 if numbers.at(kind) is numbers.at("paper") else 2
+    for kind, name in names.items():
+        for index in range(len(numbers.at(kind))):
+            keys = [papers if kind == "paper" else ours for _, ours, papers in _COLUMNS]
+            # The paper prints one decimal.
+            decimals = 1 if kind == "paper" else 2
+            rows.append(
+                [
+                    text(name) if index == 0 else "",
+                    numbers.show(kind, index, "control", decimals=0),
+                    numbers.show(kind, index, "current_a", decimals=0),
+                    *(
+                        DASH if key is None else numbers.show(kind, index, key, decimals=decimals)
+                        for key in keys
+                    ),
+                ]
+            )
+    return table(head, rows, "Residual heading error, °", "numbers")
 
 
 def _methods() -> str:

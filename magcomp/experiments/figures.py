@@ -69,7 +69,7 @@ def ellipsoids(turned: Turntable) -> Figure:
         "Raw readings of the turns about three axes and the ellipsoid through them, one for each "
         "control quantity: the same shape, moved (drag to turn).",
         data,
-        space(),
+        _with_legend(space()),
         height=480,
     )
 
@@ -98,8 +98,7 @@ def centres(turned: Turntable) -> Figure:
             hovertemplate="%{text}: %{x:.1f}, %{y:.1f}, %{z:.1f} mGauss<extra></extra>",
         ),
     ]
-    layout = space()
-    layout["scene"] = {**layout["scene"], "aspectmode": "cube"}
+    around = np.stack([made.centres.min(axis=0), made.centres.max(axis=0)])
     off = float(made.line.distances(made.centres).max())
     return Figure(
         "fig4",
@@ -107,7 +106,7 @@ def centres(turned: Turntable) -> Figure:
         f"The centres move by {reach:.0f} mGauss and lie within {off:.1f} mGauss of the paper's "
         "line; magcomp's own runs from its centre at rest by one number an ampere and axis.",
         data,
-        layout,
+        _with_legend(space(around)),
         height=480,
     )
 
@@ -186,6 +185,12 @@ def headings(flown: Flights) -> Figure:
         ),
         height=420,
     )
+
+
+def _with_legend(layout: dict[str, Any]) -> dict[str, Any]:
+    """A picture in space whose traces are named above it."""
+    legend = flat({}, {})["legend"]
+    return {**layout, "showlegend": True, "legend": legend, "margin": {"t": 36}}
 
 
 def _fine_keys() -> list[str]:
