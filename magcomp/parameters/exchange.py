@@ -163,7 +163,9 @@ class Exchange(Generic[Key]):
         return tuple(
             key
             for key, question in self._open.items()
-            if question.attempts >= limit and not self._waiting(question, now)
+            # One asked again meanwhile stayed without answer before: it need not wait for the rest.
+            if question.attempts > limit
+            or (question.attempts == limit and not self._waiting(question, now))
         )
 
     def wake(self, now: float) -> float:

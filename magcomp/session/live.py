@@ -54,7 +54,7 @@ _LOOK_S = 0.2
 _STREAMS_S = 6.0
 _MOTOR_NAMES = (
     *(f"MOT_{name}" for name in ("THST_EXPO", "SPIN_MIN", "SPIN_MAX", "PWM_MIN", "PWM_MAX")),
-    *(f"SERVO{n}_FUNCTION" for n in range(1, 17)),
+    *(f"SERVO{n}_FUNCTION" for n in range(1, 9)),
     *("COMPASS_LEARN", "COMPASS_USE", "COMPASS_USE2", "COMPASS_USE3", "BATT_MONITOR"),
 )
 _NOTHING = Now(0, None, {}, (), None, None, None, None, None, None, False)
