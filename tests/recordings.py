@@ -1,0 +1,34 @@
+"""The recordings of real firmware, each read and analysed once in a process."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import truth
+
+from magcomp.log import read
+from magcomp.model import Analysis, CompassResult, Recording
+from magcomp.session import analyse
+
+
+@cache
+def recording(name: str) -> Recording:
+    """A recording of sitl_fixtures/."""
+    return read(truth.FIXTURES / f"{name}.tlog")
+
+
+@cache
+def analysis(name: str) -> Analysis:
+    """What magcomp makes of it, asked for nothing in particular."""
+    return analyse(recording(name))
+
+
+def result(name: str, compass: int) -> CompassResult:
+    """One compass of it."""
+    return next(c for c in analysis(name).compasses if c.fit.compass == compass)
+
+
+@cache
+def of_fixture(name: str) -> truth.Truth:
+    """The vehicle as it really was."""
+    return truth.of_fixture(name, recording(name).start_unix_s)
