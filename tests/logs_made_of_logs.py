@@ -95,6 +95,19 @@ def of_kind(path: Path, kind: int) -> Path:
     return changed(path, heartbeat)
 
 
+def of_autopilot(path: Path, autopilot: int) -> Path:
+    """Write a log whose vehicle says it has another autopilot."""
+
+    def heartbeat(frame: Frame) -> Frame:
+        if frame.message != HEARTBEAT or frame.system != 1:
+            return frame
+        payload = bytearray(frame.payload.ljust(9, b"\0"))
+        payload[5] = autopilot
+        return replace(frame, payload=bytes(payload))
+
+    return changed(path, heartbeat)
+
+
 def with_parameter(path: Path, name: str, value: float) -> Path:
     """Write a log at whose end a parameter has another value."""
     all_frames = list(frames(SWEEP))

@@ -16,10 +16,12 @@ from logs_made_of_logs import (
     SWEEP,
     THROTTLE,
     frames,
+    of_autopilot,
     with_nan,
     with_second_vehicle,
     without,
 )
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from magcomp.cli.app import run
 
@@ -71,6 +73,10 @@ def two_vehicles(path: Path) -> None:
     with_second_vehicle(path, 7)
 
 
+def px4(path: Path) -> None:
+    of_autopilot(path, dialect.MAV_AUTOPILOT_PX4)
+
+
 BAD: list[tuple[Callable[[Path], None], str]] = [
     (absent, "no such file"),
     (directory, "directory"),
@@ -83,6 +89,7 @@ BAD: list[tuple[Callable[[Path], None], str]] = [
     (no_attitude, "attitude"),
     (nan_parameter, "COMPASS_OFS_X must be a finite number"),
     (two_vehicles, "--system"),
+    (px4, "ArduPilot"),
 ]
 
 

@@ -17,6 +17,7 @@ from logs_made_of_logs import (
 
 from magcomp.cli.app import run
 from magcomp.parameters.files import SUFFIXES, read_parameter_file
+from magcomp.report.files import SUFFIXES as REPORTS
 
 TRUTH = np.array(json.loads(SWEEP.with_suffix(".json").read_text())["mot_mgauss_per_amp"])
 
@@ -129,6 +130,20 @@ def test_nothing_is_written_without_being_asked(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize("suffix", REPORTS)
+def test_a_report_is_written_beside(
+    suffix: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / f"report{suffix}"
+    code, out, _ = answer(capsys, "fit", SWEEP, "--compass", 1, "--report", path)
+    assert code == 0
+    assert str(path) in out.replace("\n", "").replace(" ", "")
+    assert "COMPASS_MOT_X" in path.read_text(encoding="utf-8")
+    again = answer(capsys, "fit", SWEEP, "--compass", 1, "--report", path)
+    assert again[0] == 2
+    assert "--force" in again[2]
+
+
 def test_a_part_of_a_log_can_be_chosen(capsys: pytest.CaptureFixture[str]) -> None:
     _, out, _ = answer(capsys, "fit", SWEEP, "--json", "--compass", 2, "--start", 30, "--end", 70)
     (compass,) = json.loads(out)["compasses"]
@@ -227,6 +242,14 @@ class TestOutput:
         self.refused(capsys, path, "--force")
         assert path.read_text() == "mine"
 
+    def test_the_log_itself(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        log = tmp_path / "really.param"
+        log.write_bytes(b"a log")
+        code, _, err = answer(capsys, "fit", log, "-o", tmp_path / "." / log.name, "--force")
+        assert code == 2
+        assert "the log itself" in err
+        assert log.read_bytes() == b"a log"
+
     def test_a_name_too_long_for_the_disk(
         self, tmp_path: Path, capsys: pytest.CaptureFixture[str]
     ) -> None:
@@ -274,6 +297,17 @@ class TestText:
         _, out, _ = answer(capsys, "fit", log)
         assert "compasses 1 and 3 (alike" in out
         assert out.count("heading error   now") == 2
+
+    def test_a_name_cannot_command_the_terminal(
+        self, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        log = tmp_path / "\x1b[31mred\x07.tlog"
+        _, _, err = answer(capsys, "fit", log)
+        log.write_bytes(SWEEP.read_bytes())
+        _, out, _ = answer(capsys, "fit", log, "--compass", 1)
+        for text in (out, err):
+            assert "?[31mred?.tlog" in text
+            assert "\x1b" not in text
 
     def test_old_and_new_values_stand_side_by_side(
         self, capsys: pytest.CaptureFixture[str]

@@ -69,9 +69,9 @@ def fit(
     """
     options = Options(selection.compass, method, regressor, selection.start, selection.end)
     if output is not None:
-        check_output(output, SUFFIXES, force=force)
+        check_output(output, SUFFIXES, log, force=force)
     if report is not None:
-        check_output(report, report_files.SUFFIXES, force=force)
+        check_output(report, report_files.SUFFIXES, log, force=force)
     recording, analysis = fit_log(log, options, selection.system)
     rejected = analysis.grade is Grade.REJECTED
     chosen = parameter_set(analysis, include_rejected=rejected and force)
@@ -79,6 +79,11 @@ def fit(
     if output is not None and (force or not rejected):
         write_parameter_file(output, chosen, force=force)
         written = str(output)
+    if report is not None:
+        page = report_files.report_text(
+            report.suffix, recording, analysis, options=options, written=written
+        )
+        report_files.write_text(report, page, force=force)
     if to_json:
         answer(as_json.dumps(as_json.analysis_object(analysis, written)))
     else:
@@ -88,7 +93,13 @@ def fit(
         present = present_parameters(recording)
         answer(
             as_text.analysis_text(
-                analysis, chosen.values, present, look(), written=written, verbose=verbose
+                analysis,
+                chosen.values,
+                present,
+                look(),
+                written=written,
+                report=None if report is None else str(report),
+                verbose=verbose,
             )
         )
     if not rejected:

@@ -78,8 +78,19 @@ def selection_options(command: Callable[..., _Result]) -> Callable[..., _Result]
     return with_selection
 
 
-def check_output(path: Path, suffixes: Sequence[str], *, force: bool) -> None:
+def check_output(path: Path, suffixes: Sequence[str], log: Path, *, force: bool) -> None:
     """Refuse an output that could not be written, before the work is done.
+
+    Parameters
+    ----------
+    path
+        Where the output is to go.
+    suffixes
+        Those it may have.
+    log
+        What is read, which the output must not replace.
+    force
+        Whether a file that is there may be replaced.
 
     Raises
     ------
@@ -97,6 +108,8 @@ def check_output(path: Path, suffixes: Sequence[str], *, force: bool) -> None:
     try:
         if path.is_dir():
             raise OutputError(f"{path} must be a file; instead it is a directory")
+        if path.exists() and log.exists() and path.samefile(log):
+            raise OutputError(f"{path} must not be the log itself; instead received the same file")
         if path.exists() and not force:
             raise OutputError(f"{path} must not exist yet; use --force to overwrite it")
         if not path.parent.is_dir():

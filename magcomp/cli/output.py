@@ -20,7 +20,8 @@ _LEAST_COLUMNS, _MOST_COLUMNS = 80, 100
 
 def complain(message: str) -> None:
     """Write one sentence to stderr."""
-    sentence = " ".join(message.split())
+    # A name in a message may hold anything, also what a terminal would obey.
+    sentence = "".join(c if c.isprintable() else "?" for c in " ".join(message.split()))
     if sentence and sentence[-1] not in ".!?":
         sentence += "."
     _write(sys.stderr, f"magcomp: {sentence}\n")

@@ -42,7 +42,7 @@ def report(
 
     A report is written whatever the verdict; the exit code is that of magcomp fit.
     """
-    check_output(output, SUFFIXES, force=force)
+    check_output(output, SUFFIXES, log, force=force)
     options = Options(selection.compass, method, regressor, selection.start, selection.end)
     recording, analysis = fit_log(log, options, selection.system)
     write_text(

@@ -39,6 +39,7 @@ def analysis_text(
     look: Look,
     *,
     written: str | None = None,
+    report: str | None = None,
     verbose: bool = False,
     advise: bool = True,
 ) -> str:
@@ -56,6 +57,8 @@ def analysis_text(
         Width and colour.
     written
         The parameter file it went to, if any.
+    report
+        The report that was written, if any.
     verbose
         Every parameter and every level.
     advise
@@ -68,7 +71,7 @@ def analysis_text(
             *evidence(analysis),
             *_parameters(parameters, present, verbose=verbose),
             *(_levels(analysis) if verbose else ()),
-            *(_ending(analysis, written) if advise else ()),
+            *(_ending(analysis, written, report) if advise else ()),
         ],
         look,
     )
@@ -143,7 +146,7 @@ def render(parts: Iterable[RenderableType], look: Look) -> str:
 def heading(source: str, vehicle: Vehicle, duration_s: float) -> Iterator[RenderableType]:
     """Whose recording this is."""
     yield Rule(Text(f"magcomp {__version__}", style="bold"), align="left", style="dim")
-    yield Text(f" {source}", style="bold", no_wrap=True, overflow="ignore")
+    yield Text(f" {words.printable(source)}", style="bold", no_wrap=True, overflow="ignore")
     yield Text(f" {words.duration(duration_s)} of {words.vehicle(vehicle)}")
     if vehicle.device_ids:
         ids = ", ".join(map(str, vehicle.device_ids))
@@ -264,11 +267,13 @@ def _levels(analysis: Analysis) -> Iterator[RenderableType]:
         yield tables.levels(result)
 
 
-def _ending(analysis: Analysis, written: str | None) -> Iterator[RenderableType]:
+def _ending(
+    analysis: Analysis, written: str | None, report: str | None
+) -> Iterator[RenderableType]:
     yield Text()
     accepted = analysis.grade is not Grade.REJECTED
     if written is not None:
-        yield _last(f"Written to {written}.", _AFTER_WRITING)
+        yield _last(f"Written to {words.printable(written)}.", _AFTER_WRITING)
     elif accepted:
         yield _last("Nothing is written yet.", "Add -o compass.param to write these parameters.")
     else:
@@ -278,6 +283,8 @@ def _ending(analysis: Analysis, written: str | None) -> Iterator[RenderableType]
         yield _last("", f"Left without compensation because rejected: {words.compasses(rejected)}.")
     elif rejected and written is not None:
         yield _last("", "The judge rejects this fit; it is written because of --force.")
+    if report is not None:
+        yield _last("", f"The report is in {words.printable(report)}.")
 
 
 def _last(first: str, second: str) -> RenderableType:

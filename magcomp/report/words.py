@@ -83,3 +83,8 @@ def vehicle(of: Vehicle) -> str:
 def sentence(text: str) -> str:
     """A reason with a capital letter and a full stop."""
     return f"{text[:1].upper()}{text[1:]}".rstrip(".") + "."
+
+
+def printable(name: str) -> str:
+    """A file's name without what a terminal would obey."""
+    return "".join(c if c.isprintable() else "?" for c in name)
