@@ -10,6 +10,7 @@ import json
 import os
 import shutil
 import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -28,6 +29,15 @@ FLAGS = (
     "--disable-sync",
     "--remote-debugging-pipe",
 )
+
+# The pipe's ends must be 3 and 4 in the browser, whatever they are here.
+LAUNCH = """
+import fcntl, os, sys
+ends = [fcntl.fcntl(int(end), fcntl.F_DUPFD, 10) for end in sys.argv[1:3]]
+for end, number in zip(ends, (3, 4)):
+    os.dup2(end, number)
+os.execv(sys.argv[3], sys.argv[3:])
+"""
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 
@@ -137,9 +147,8 @@ def chromium_page(profile: Path) -> Iterator[Page]:
     to_browser, commands = os.pipe()
     answers, from_browser = os.pipe()
     process = subprocess.Popen(
-        # The pipe's ends must be 3 and 4 in the browser, whatever they are here.
         [
-            *("/bin/sh", "-c", f'exec "$@" 3<&{to_browser} 4>&{from_browser}', "sh"),
+            *(sys.executable, "-c", LAUNCH, str(to_browser), str(from_browser)),
             *(path, *FLAGS, f"--user-data-dir={profile}", "about:blank"),
         ],
         pass_fds=(to_browser, from_browser),

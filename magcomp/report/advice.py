@@ -76,7 +76,7 @@ def _write(document: Document, kept: list[int]) -> str:
 def _left(compass: Mapping[str, Any]) -> str:
     if compass["parameters"]:
         return (
-            "It gets no correction, and its motor vector is set to zero because one switch, "
+            "It gets no correction: its motor vector must be zero, because one switch, "
             "COMPASS_MOTCT, serves all compasses"
         )
     return "It is left as it is"

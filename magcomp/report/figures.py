@@ -255,7 +255,7 @@ def sphere(result: CompassResult, plots: CompassPlots) -> Figure:
         "Attitudes covered",
         f"Where the earth's field pointed in the vehicle's own axes, cells of equal area: "
         f"{share * 100:.0f} % of them are filled, and the more are, the less is taken on trust "
-        "(an upright flight cannot fill the top).",
+        "(an upright flight fills one end only).",
         [
             _map(
                 [-180 + 360 / sectors * (k + 0.5) for k in range(sectors)],

@@ -13,6 +13,7 @@ from magcomp.report.figure import GRID, INK, SCALE, Figure, Quantity, Trace, rou
 
 _MOST_ELLIPSOIDS = 5
 _FLIGHT_ELLIPSOIDS = 2
+_MARGIN = 1.04
 _CHI2_95 = 7.815
 """95 % quantile of χ² with three degrees of freedom."""
 
@@ -45,7 +46,7 @@ def cloud(result: CompassResult, plots: CompassPlots, quantity: Quantity) -> Fig
         "The field in space",
         _caption(fit, quantity, len(levels)),
         data,
-        space(),
+        space(_corners(data)),
         height=SPACE_HEIGHT,
     )
 
@@ -63,9 +64,10 @@ def centres(result: CompassResult, quantity: Quantity) -> Figure:
         "centres",
         "The line of centres",
         f"The same centres near by, each in the ellipsoid it lies in with 95 % probability: they "
-        f"stand {off:.1f} mGauss off the straight line that the method rests on.",
+        f"stand {off:.{1 if off >= 0.1 else 2}f} mGauss off the straight line that the method "
+        "rests on.",
         data,
-        space(),
+        space(_corners(data)),
         height=SPACE_HEIGHT,
     )
 
@@ -203,11 +205,37 @@ def _line_of_centres(fit: MotorFit, quantity: Quantity) -> list[Trace]:
     ]
 
 
-def space() -> dict[str, Any]:
-    """Layout of a picture in space, in body axes."""
+def _corners(data: Sequence[Trace]) -> FloatArray:
+    """Lowest and highest value on each axis, shape (2, 3); zeros for an empty picture."""
+    columns = [
+        [value for trace in data for value in trace[name] if value is not None] for name in "xyz"
+    ]
+    if not columns[0]:
+        return np.zeros((2, 3))
+    return np.array([[min(c) for c in columns], [max(c) for c in columns]])
 
-    def side(title: str) -> dict[str, Any]:
+
+def space(corners: FloatArray | None = None) -> dict[str, Any]:
+    """Layout of a picture in space, in body axes.
+
+    Parameters
+    ----------
+    corners
+        What must be seen, lowest and highest value on each axis, shape (2, 3): the picture is
+        then a cube of one scale around it. By default the axes choose for themselves.
+    """
+    cube: list[dict[str, Any]] = [{}, {"autorange": "reversed"}, {"autorange": "reversed"}]
+    if corners is not None:
+        middle = corners.mean(axis=0)
+        half = max(float(np.ptp(corners, axis=0).max()), 1.0) * _MARGIN / 2
+        cube = [
+            {"range": rounded([m - sign * half, m + sign * half], 2)}
+            for m, sign in zip(middle, (1, -1, -1), strict=True)
+        ]
+
+    def side(title: str, axis: int) -> dict[str, Any]:
         return {
+            **cube[axis],
             "title": {"text": title},
             "gridcolor": GRID,
             "zerolinecolor": GRID,
@@ -218,12 +246,12 @@ def space() -> dict[str, Any]:
 
     return {
         "scene": {
-            "xaxis": side("x forward"),
+            "xaxis": side("x forward", 0),
             # Down is drawn downwards, as the vehicle stands; reversing y too keeps the picture from
             # being a mirror image.
-            "yaxis": {**side("y right"), "autorange": "reversed"},
-            "zaxis": {**side("z down"), "autorange": "reversed"},
-            "aspectmode": "data",
+            "yaxis": side("y right", 1),
+            "zaxis": side("z down", 2),
+            "aspectmode": "data" if corners is None else "cube",
             "camera": {
                 "eye": {"x": 1.45, "y": -1.45, "z": 0.65},
                 "center": {"x": 0, "y": 0, "z": -0.08},

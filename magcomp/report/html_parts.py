@@ -42,12 +42,6 @@ class Numbers:
         scaled = "" if scale == 1.0 else f' data-scale="{scale:g}"'
         return f'<data value="{value!r}" data-key="{escape(place)}"{scaled}>{minus(text)}</data>'
 
-    def vector(self, *key: str | int, decimals: int | None = None) -> str:
-        """A list of numbers, commas between them."""
-        return ", ".join(
-            self.show(*key, index, decimals=decimals) for index in range(len(self.at(*key)))
-        )
-
 
 def parameter(value: float) -> str:
     """A parameter's value: short, and finer than a heading can tell."""
@@ -85,13 +79,13 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]], caption: str, kind
     )
 
 
-def facts(pairs: Iterable[tuple[str, str]]) -> str:
-    """Names and values; values are HTML."""
-    return (
-        '<dl class="facts">'
-        + "".join(f"<div><dt>{text(name)}</dt><dd>{value}</dd></div>" for name, value in pairs)
-        + "</dl>"
-    )
+def facts(pairs: Iterable[tuple[str, str]], whole: str = "") -> str:
+    """Names and values; values are HTML, and the one named ``whole`` has a row of its own."""
+    rows = []
+    for name, value in pairs:
+        kind = ' class="whole"' if name == whole else ""
+        rows.append(f"<div{kind}><dt>{text(name)}</dt><dd>{value}</dd></div>")
+    return f'<dl class="facts">{"".join(rows)}</dl>'
 
 
 _SIGNS = {

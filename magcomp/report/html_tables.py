@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
 
@@ -10,6 +11,10 @@ from magcomp.report import words
 from magcomp.report.evidence import CompassPlots
 from magcomp.report.figure import Quantity, quantity_of
 from magcomp.report.html_parts import DASH, Numbers, badge, facts, minus, parameter, table, text
+
+_MOST_DECIMALS = 4
+_NEARLY = 1.05
+"""A row this little above the range the log covers still counts as covered."""
 
 
 def overview(numbers: Numbers) -> str:
@@ -31,10 +36,15 @@ def overview(numbers: Numbers) -> str:
             f'<p class="figure"><span class="was">{before}°</span>'
             f'<span class="arrow" aria-label="falls to at most">→</span>'
             f'<span class="now">≤ {bound}°</span></p>'
-            f"<p>heading error at {u} {_unit(quantity)}, now and with the fit (95 % bound)</p>"
+            f"<p>heading error at {u} {_unit(quantity)}, now and {_with(compass['verdict'])} "
+            f"(95 % bound)</p>"
             f"<p>unexplained field on data the fit did not see: {was} → {left} mGauss</p></article>"
         )
     return f'<div class="cards">{"".join(cards)}</div>'
+
+
+def _with(verdict: str) -> str:
+    return "with a fit that is not to be trusted" if verdict == "rejected" else "with the fit"
 
 
 def _unit(quantity: Quantity) -> str:
@@ -42,11 +52,12 @@ def _unit(quantity: Quantity) -> str:
 
 
 def _covered_row(compass: Mapping[str, object]) -> int:
-    """The row of the table next to the largest control quantity the log covers."""
+    """The last row of the table that the log covers."""
     rows, coverage = compass["heading_error_deg"], compass["coverage"]
     if not isinstance(rows, list) or not isinstance(coverage, dict):
         return 0
-    return min(range(len(rows)), key=lambda k: abs(rows[k]["u"] - coverage["u_high"]))
+    covered = [k for k, row in enumerate(rows) if row["u"] <= _NEARLY * coverage["u_high"]]
+    return covered[-1] if covered else 0
 
 
 def heading_errors(numbers: Numbers, index: int, quantity: Quantity) -> str:
@@ -105,11 +116,11 @@ def findings(numbers: Numbers, index: int, quantity: Quantity) -> str:
     """Interference, lags, coverage and how the answer was found."""
     compass = ("compasses", index)
     per = "mGauss per A" if quantity.scale == 1.0 else "mGauss at full throttle"
+    interference = f"Interference, {per}"
     pairs = [
         (
-            f"Interference, {per}",
-            f"{numbers.vector(*compass, 'interference_mgauss')} "
-            f"<small>± {numbers.vector(*compass, 'std_mgauss')}</small>",
+            interference,
+            "".join(_axis(numbers, index, axis) for axis in range(3)),
         ),
         ("Field behind attitude", _lag(numbers, index, "field")),
         (f"{quantity.name.capitalize()} against field", _lag(numbers, index, "regressor")),
@@ -123,11 +134,23 @@ def findings(numbers: Numbers, index: int, quantity: Quantity) -> str:
         ("Straightness of the line", _straightness(numbers, index)),
         (
             "Earth’s field",
-            f"{numbers.show(*compass, 'earth_mgauss', 'strength', decimals=0)} mGauss, "
-            f"{numbers.show(*compass, 'earth_mgauss', 'vertical', decimals=0)} of it downwards",
+            f"{numbers.show(*compass, 'earth_mgauss', 'strength', decimals=0)} mGauss, vertical "
+            f"{numbers.show(*compass, 'earth_mgauss', 'vertical', decimals=0)}",
         ),
     ]
-    return facts(pairs)
+    return facts(pairs, whole=interference)
+
+
+def _axis(numbers: Numbers, index: int, axis: int) -> str:
+    """One component of the interference, to the second digit of its standard error."""
+    std = numbers.at("compasses", index, "std_mgauss", axis)
+    decimals = 1 - math.floor(math.log10(std)) if std else _MOST_DECIMALS
+    decimals = min(max(decimals, 0), _MOST_DECIMALS)
+    value, doubt = (
+        numbers.show("compasses", index, name, axis, decimals=decimals)
+        for name in ("interference_mgauss", "std_mgauss")
+    )
+    return f"<span>{'xyz'[axis]} {value} <small>± {doubt}</small></span>"
 
 
 def _lag(numbers: Numbers, index: int, which: str) -> str:

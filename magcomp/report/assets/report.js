@@ -22,7 +22,8 @@
   const touch = matchMedia("(pointer: coarse)");
   const root = document.documentElement;
   const canvases = [...document.querySelectorAll(".canvas")];
-  const PRINT_WIDE = 680, PRINT_HALF = 330;
+  // Widths in print, where the page cannot be measured before it is laid out.
+  const PRINT = { wide: 690, beside: 385, half: 335 };
 
   // "@scale:0.25" is the colour a quarter of the way along the scale.
   const between = (scale, share) => {
@@ -88,10 +89,10 @@
   };
 
   const picture = async (canvas) => {
-    const size = { width: 1000, height: 760 };
+    const size = { width: 560, height: 430 };
     const image = new Image();
     image.alt = canvas.getAttribute("aria-label");
-    image.src = await Plotly.toImage(figure(canvas, "light", size), { format: "png", ...size });
+    image.src = await Plotly.toImage(figure(canvas, "light", size), { format: "png", scale: 2, ...size });
     canvas.after(image);
     canvas.parentNode.classList.add("imaged");
   };
@@ -124,8 +125,10 @@
   if (tabs.length) { root.classList.add("tabbed"); select(tabs[0]); }
 
   dark.addEventListener("change", () => canvases.forEach((c) => redraw(c, theme())));
-  addEventListener("beforeprint", () => canvases.forEach((c) => redraw(c, "light",
-    { width: c.closest(".wide") ? PRINT_WIDE : PRINT_HALF, autosize: false })));
+  addEventListener("beforeprint", () => canvases.forEach((c) => {
+    const place = c.closest(".wide") ? "wide" : c.closest(".beside") ? "beside" : "half";
+    redraw(c, "light", { width: PRINT[place], height: c.clientHeight, autosize: false });
+  }));
   addEventListener("afterprint", () => canvases.forEach((c) => redraw(c, theme())));
 
   const idle = () => new Promise((go) => ("requestIdleCallback" in window)
