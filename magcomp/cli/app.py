@@ -30,6 +30,13 @@ COMMANDS = {
     "report": _Command("magcomp.cli.report", "Fit a log and write a report to look at."),
     "heading": _Command("magcomp.cli.heading", "Raw, corrected and gyro-fused heading of a log."),
     "reproduce": _Command("magcomp.cli.reproduce", "Carry out the paper's experiments again."),
+    "calibrate": _Command(
+        "magcomp.cli.calibrate", "Guide, record and fit a live vehicle; write the answer to it."
+    ),
+    "record": _Command("magcomp.cli.record", "Record a live vehicle into a .tlog."),
+    "upload": _Command("magcomp.cli.upload", "Write a parameter file to a vehicle, and prove it."),
+    "restore": _Command("magcomp.cli.restore", "Bring a vehicle back to a backup."),
+    "simulate": _Command("magcomp.cli.simulate", "Be a vehicle to try everything on."),
     "demo": _Command("magcomp.cli.demo", "Fit a recorded flight whose truth is known."),
 }
 

@@ -263,7 +263,9 @@ def _warnings(current: Mapping[str, float], asked: Mapping[str, float]) -> list[
         if name.startswith("COMPASS_SCALE") and not 1 / _SCALE_LIMIT <= value <= _SCALE_LIMIT:
             warnings.append(f"{name} {format_value(value)} is out of limits and will be ignored.")
     after = {**current, **asked}
-    vectors = any("MOT" in name and not _SWITCH.fullmatch(name) for name in asked)
+    vectors = any(
+        value and "MOT" in name and not _SWITCH.fullmatch(name) for name, value in asked.items()
+    )
     if vectors and after.get("COMPASS_MOTCT") == 0 and not after.get("COMPASS_PMOT_EN"):
         warnings.append("COMPASS_MOTCT stays 0: the compensation will not be in force.")
     if after.get("COMPASS_PMOT_EN"):

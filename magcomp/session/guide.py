@@ -49,6 +49,7 @@ LEVEL_ENOUGH = 0.3
 LEVELS_ENOUGH = 3
 STEPS_ENOUGH = 5
 STEP_S = 3.0
+DISARMED_S = 3.0
 FLIGHT_S = 60.0
 SECTORS_ENOUGH = SECTORS - 1
 THROTTLES_ENOUGH = 3
@@ -218,6 +219,22 @@ def is_settled(view: View) -> bool:
     return view.grade is Grade.GOOD and view.stable_refits >= _STABLE_REFITS
 
 
+def pilot_is_done(situation: Situation, disarmed_s: float, levels: int) -> bool:
+    """Whether the pilot has ended the measurement by disarming.
+
+    Parameters
+    ----------
+    disarmed_s
+        Seconds since the motors were switched off; 0 while they are on or have not been.
+    levels
+        How many throttle levels are done.
+    """
+    if disarmed_s < DISARMED_S or situation in (Situation.GROUND, Situation.UNSURE):
+        return False
+    # Whoever holds it may switch the motors off to turn it over, and goes on.
+    return situation is not Situation.HELD or levels >= LEVELS_ENOUGH
+
+
 def level_seconds(view: View) -> tuple[float, ...]:
     """Seconds recorded at each throttle level."""
     return tuple((view.coverage.share * view.seconds).tolist())
@@ -287,9 +304,11 @@ def _guide_held(view: View) -> Guidance:
             return Guidance(_ending(view), 1.0, enough=True)
     level = _level(view)
     if level in done:
-        wanted = next((each for each in _HELD_LEVELS if each not in done), None)
-        if wanted is None:
-            return Guidance(f"{_turn(view)} at this throttle", share)
+        wanted = next((each for each in _HELD_LEVELS if each not in done), LEVELS // 2 + 1)
+        if len(done) >= LEVELS_ENOUGH:
+            return Guidance(
+                f"disarm to end, or make it surer: {_throttle_to(wanted, level)}", share
+            )
         return Guidance(_throttle_to(wanted, level), share)
     return Guidance(f"hold the throttle and {_held_motion(view, level)}", share)
 

@@ -163,13 +163,14 @@ class LiveSession:
             The log to replay is none.
         """
         recorder = None if record is None else Recorder(record, force=force)
-        tap = Tap(Buffer(address), Latest(), recorder)
+        source = address if record is None else str(record)
+        tap = Tap(Buffer(source), Latest(), recorder)
         try:
             connection = connect(
                 address, baud=baud, system=system, key=signing_key, sinks=[tap], clock=clock
             )
         except MagcompError:
-            tap.discard()
+            tap.close()
             raise
         return cls(
             connection,
@@ -236,6 +237,7 @@ class LiveSession:
             recording_path=self._tap.path,
             recording_bytes=self._tap.size,
             recording=self._tap.taking and not self._tap.failure,
+            recording_trouble=self._tap.failure,
             link=link,
             compasses=compasses_now(now, parameters, refit.analysis),
             throttle=now.throttle,
@@ -391,7 +393,7 @@ class LiveSession:
         self.connection.close()
         for thread in self._threads:
             thread.join()
-        self._tap.stop()
+        self._tap.close()
 
     # ---------------------------------------------------------------- the threads
 

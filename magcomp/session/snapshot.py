@@ -74,6 +74,8 @@ class LiveSnapshot:
         The .tlog being written; None and 0 without one.
     recording
         Frames are still taken: False after ``stop_recording``, or where the disk refused.
+    recording_trouble
+        Why the disk refused, a sentence; empty where it did not.
     link
         Rates in Hz by message, losses, round trip, gaps.
     compasses
@@ -117,6 +119,7 @@ class LiveSnapshot:
     recording_path: Path | None
     recording_bytes: int
     recording: bool
+    recording_trouble: str
     link: LinkStatistics
     compasses: tuple[CompassNow, ...]
     throttle: float | None

@@ -11,7 +11,7 @@ from magcomp.link import Recorder
 from magcomp.session.latest import Latest
 
 _STAMP_SIZE = 8
-_LONGEST_STEP_US = 1_000_000
+_LONGEST_STEP_MS = 1500
 _ATTITUDE = 30
 
 
@@ -42,8 +42,8 @@ class Tap:
         self._taking = True
         self.failure = ""
         self._size = 0
-        self._attitude_us = 0
-        self._last_attitude_us = 0
+        self._attitude_ms = 0
+        self._last_attitude_ms = 0
 
     @property
     def path(self) -> Path | None:
@@ -62,8 +62,8 @@ class Tap:
 
     @property
     def seconds(self) -> float:
-        """Seconds in which attitudes came; gaps do not count."""
-        return self._attitude_us * 1e-6
+        """Seconds of the vehicle's clock in which attitudes came; gaps do not count."""
+        return self._attitude_ms * 1e-3
 
     def add(self, unix_us: int, frame: bytes) -> None:
         """Take one whole frame that arrived at ``unix_us``."""
@@ -72,7 +72,7 @@ class Tap:
             if not self._taking:
                 return
             self.buffer.add(unix_us, frame)
-            self._count(unix_us, frame)
+            self._count(frame)
             if self._recorder is not None and not self.failure:
                 self._write(self._recorder, unix_us, frame)
 
@@ -86,8 +86,8 @@ class Tap:
                 except OutputError as error:
                     self.failure = str(error)
 
-    def discard(self) -> None:
-        """Close and remove a file into which nothing came."""
+    def close(self) -> None:
+        """Stop, and remove a file into which nothing came."""
         self.stop()
         if self.path is not None and self._size == 0:
             self.path.unlink(missing_ok=True)
@@ -100,10 +100,12 @@ class Tap:
             return
         self._size += len(frame) + _STAMP_SIZE
 
-    def _count(self, unix_us: int, frame: bytes) -> None:
-        message = frame[5] if frame[0] == 0xFE else int.from_bytes(frame[7:10], "little")
-        if message == _ATTITUDE:
-            step = unix_us - self._last_attitude_us
-            if 0 < step < _LONGEST_STEP_US:
-                self._attitude_us += step
-            self._last_attitude_us = unix_us
+    def _count(self, frame: bytes) -> None:
+        header, message = (6, frame[5]) if frame[0] == 0xFE else (10, frame[7])
+        if message != _ATTITUDE or (frame[0] == 0xFD and frame[8:10] != b"\0\0"):
+            return
+        # ATTITUDE begins with time_boot_ms.
+        now_ms = int.from_bytes(frame[header : header + min(frame[1], 4)], "little")
+        if 0 < now_ms - self._last_attitude_ms < _LONGEST_STEP_MS:
+            self._attitude_ms += now_ms - self._last_attitude_ms
+        self._last_attitude_ms = now_ms

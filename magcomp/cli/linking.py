@@ -1,0 +1,182 @@
+"""What commands that speak with a vehicle share: options, interruptions, a status line."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import shutil
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+import click
+
+from magcomp.cli.output import complain
+from magcomp.errors import UsageError
+from magcomp.link import read_signing_key
+
+_Result = TypeVar("_Result")
+
+HEARTBEAT_S = 10.0
+"""How long the first heartbeat is waited for."""
+
+address_argument = click.argument("address")
+yes_option = click.option("--yes", is_flag=True, help="Write without asking.")
+any_vehicle_option = click.option(
+    "--any-vehicle", is_flag=True, help="Write to another vehicle than the parameters belong to."
+)
+
+
+@dataclass(frozen=True)
+class LinkOptions:
+    """How to reach a vehicle.
+
+    Attributes
+    ----------
+    system
+        Its MAVLink system; None takes the only one there is.
+    baud
+        Of a serial port whose address does not say.
+    key
+        Signing key of 32 bytes, or None.
+    timeout
+        Seconds to wait for it.
+    """
+
+    system: int | None
+    baud: int | None
+    key: bytes | None
+    timeout: float
+
+
+def link_options(command: Callable[..., _Result]) -> Callable[..., _Result]:
+    """Give a command --system, --baud, --signing-key and --timeout as one ``LinkOptions``."""
+
+    @click.option("--system", type=click.IntRange(1, 255), help="MAVLink system of the vehicle.")
+    @click.option("--baud", type=int, metavar="N", help="Speed of a serial port.")
+    @click.option(
+        "--signing-key",
+        type=click.Path(path_type=Path),
+        metavar="FILE",
+        help="Sign what is sent and refuse what is not signed: 32 bytes, or a passphrase.",
+    )
+    @click.option(
+        "--timeout",
+        type=click.FloatRange(min=0.1),
+        default=HEARTBEAT_S,
+        show_default=True,
+        metavar="S",
+        help="How long to wait for the vehicle.",
+    )
+    @functools.wraps(command)
+    def with_link(
+        system: int | None,
+        baud: int | None,
+        signing_key: Path | None,
+        timeout: float,
+        **others: object,
+    ) -> _Result:
+        key = None if signing_key is None else read_signing_key(signing_key)
+        return command(link=LinkOptions(system, baud, key, timeout), **others)
+
+    return with_link
+
+
+def positive_seconds(seconds: float | None) -> float | None:
+    """Refuse a duration that is none.
+
+    Raises
+    ------
+    UsageError
+        It is not above 0.
+    """
+    if seconds is not None and not seconds > 0:
+        raise UsageError(f"--seconds must be above 0; instead received {seconds:g}")
+    return seconds
+
+
+@contextlib.contextmanager
+def stop_on_interrupt() -> Iterator[threading.Event]:
+    """Turn the first Ctrl-C, or a polite kill, into an event; the second one interrupts.
+
+    A thread other than the main one gets an event that nothing sets.
+    """
+    stop = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield stop
+        return
+
+    def first(_number: int, _frame: object) -> None:
+        if stop.is_set():
+            raise KeyboardInterrupt
+        stop.set()
+
+    kinds = (signal.SIGINT, signal.SIGTERM)
+    before = [signal.signal(kind, first) for kind in kinds]
+    try:
+        yield stop
+    finally:
+        for kind, handler in zip(kinds, before, strict=True):
+            signal.signal(kind, handler)
+
+
+class StatusLine:
+    """What is going on, on stderr: one line kept up to date on a terminal, else a line a change."""
+
+    def __init__(self, *, terminal: bool | None = None) -> None:
+        is_terminal = sys.stderr is not None and sys.stderr.isatty()
+        self._terminal = is_terminal if terminal is None else terminal
+        self._shown = ""
+        self._width = 0
+
+    @property
+    def is_terminal(self) -> bool:
+        """Whether the line is kept up to date."""
+        return self._terminal
+
+    def show(self, lasting: str, passing: str = "") -> None:
+        """Show a text.
+
+        Parameters
+        ----------
+        lasting
+            Where there is no terminal, a line is written only when this changes.
+        passing
+            Numbers that change all the time; only a terminal shows them.
+        """
+        if self._terminal:
+            text = f"{passing}  {lasting}" if passing else lasting
+            text = text[: max(_columns() - 1, 20)]
+            _to_stderr(f"\r{text.ljust(self._width)}")
+            self._width = len(text)
+        elif lasting != self._shown:
+            complain(lasting)
+        self._shown = lasting
+
+    def clear(self) -> None:
+        """Take the line away."""
+        if self._terminal and self._width:
+            _to_stderr(f"\r{' ' * self._width}\r")
+            self._width = 0
+
+    def say(self, sentence: str) -> None:
+        """Write a sentence that stays."""
+        self.clear()
+        complain(sentence)
+
+
+def _columns() -> int:
+
+    return shutil.get_terminal_size((80, 24)).columns
+
+
+def _to_stderr(text: str) -> None:
+    if sys.stderr is not None:
+        encoding = sys.stderr.encoding or "utf-8"
+        with contextlib.suppress(BrokenPipeError):
+            sys.stderr.write(text.encode(encoding, errors="replace").decode(encoding))
+            sys.stderr.flush()

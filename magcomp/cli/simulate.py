@@ -1,0 +1,97 @@
+"""``magcomp simulate``: a vehicle to try everything on."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import click
+
+from magcomp.cli.linking import stop_on_interrupt
+from magcomp.cli.output import answer, complain
+from magcomp.errors import ExitCode
+from magcomp.link import read_signing_key
+from magcomp.simulate import PROGRAMS, Faults, Vehicle, scenario, serve
+
+_ADDRESS = "udpout:127.0.0.1:14550"
+
+
+@click.command("simulate")
+@click.argument("address", default=_ADDRESS)
+@click.option("--seed", type=int, default=1, show_default=True, help="Which vehicle.")
+@click.option(
+    "--program",
+    type=click.Choice(PROGRAMS),
+    default="flight",
+    show_default=True,
+    help="What it does once a ground station speaks to it.",
+)
+@click.option(
+    "--speed",
+    type=float,
+    default=1.0,
+    show_default=True,
+    metavar="X",
+    help="How many times faster than real time.",
+)
+@click.option(
+    "--loss",
+    type=float,
+    default=0.0,
+    show_default=True,
+    metavar="P",
+    help="Share of the frames lost, each way, 0 … 1.",
+)
+@click.option(
+    "--latency",
+    type=float,
+    default=0.0,
+    show_default=True,
+    metavar="S",
+    help="Time every frame takes, each way.",
+)
+@click.option(
+    "--truth",
+    type=click.Path(path_type=Path),
+    metavar="FILE.json",
+    help="Write what the vehicle really is.",
+)
+@click.option(
+    "--signing-key",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Sign every frame, and take none that is not signed.",
+)
+def simulate(
+    address: str,
+    seed: int,
+    program: str,
+    speed: float,
+    loss: float,
+    latency: float,
+    truth: Path | None,
+    signing_key: Path | None,
+) -> ExitCode:
+    """Be an ArduCopter with three compasses, reached at ADDRESS (udpout:127.0.0.1:14550).
+
+    ADDRESS may be udpout:HOST:PORT, udp:HOST:PORT, tcpin:HOST:PORT, tcp:HOST:PORT or pty. It
+    waits for a ground station, carries out its programme, and is then disarmed and ready to be
+    written. Its compasses are disturbed by its motors; --truth says how. Ctrl-C ends it.
+    """
+    faults = Faults(loss=loss, latency_s=latency) if loss or latency else None
+    key = None if signing_key is None else read_signing_key(signing_key)
+    chosen = scenario(program, seed)
+    vehicle = Vehicle(chosen, start_unix_s=time.time(), wait_for_ground=True, signing_key=key)
+    if truth is not None:
+        chosen.truth.write(truth)
+
+    def announce(reached_at: str) -> None:
+        complain(
+            f"A simulated vehicle (seed {seed}) waits for a ground station, then: {program}, "
+            f"{vehicle.duration_s / speed:.0f} s. Reach it with: magcomp calibrate {reached_at}"
+        )
+        answer(f"{reached_at}\n")
+
+    with stop_on_interrupt() as stop:
+        serve(address, vehicle, speed=speed, faults=faults, announce=announce, stop=stop)
+    return ExitCode.GOOD

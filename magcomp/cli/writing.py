@@ -1,0 +1,135 @@
+"""Showing a difference, asking, writing, and saying what stands."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from magcomp.cli.linking import StatusLine
+from magcomp.cli.output import answer, complain, look
+from magcomp.errors import ExitCode, MagcompError, UsageError
+from magcomp.parameters.events import (
+    Event,
+    Mismatch,
+    Outcome,
+    Progress,
+    Reason,
+    Restarted,
+    RollingBack,
+    Stage,
+)
+from magcomp.parameters.files import format_value
+from magcomp.parameters.plan import WritePlan
+from magcomp.parameters.writer import raise_for_failure
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+_STAGES = {
+    Stage.COMPARE: "comparing with the backup",
+    Stage.SETTLE: "waiting for the link to settle",
+    Stage.IDENTIFY: "identifying the vehicle again",
+    Stage.OFF: "switching the motor compensation off",
+    Stage.WRITE: "writing",
+    Stage.VERIFY: "reading back",
+    Stage.ON: "switching the motor compensation on",
+    Stage.CONFIRM: "confirming",
+    Stage.OVER: "done",
+}
+
+Write = Callable[[Callable[[Event], None], Callable[[], bool]], Outcome]
+"""Does the writing, given who is told and who is asked whether to stop."""
+
+
+def need_consent(*, yes: bool, dry_run: bool = False) -> None:
+    """Refuse early to write where nobody can be asked.
+
+    Raises
+    ------
+    UsageError
+        There is no terminal and --yes is not given.
+    """
+    if not yes and not dry_run and not (sys.stdin is not None and sys.stdin.isatty()):
+        raise UsageError("--yes must be given to write where there is no terminal to ask at")
+
+
+def show_difference(plan: WritePlan, *, to_stderr: bool = False) -> None:
+    """Print old → new of every parameter that changes, and what the pilot must know."""
+    from rich.text import Text  # noqa: PLC0415
+
+    from magcomp.report import as_text, tables, words  # noqa: PLC0415 - rich only for people
+
+    changes = {change.name: change.new for change in plan.changes}
+    parts: list[RenderableType] = [Text(f" {words.vehicle(plan.vehicle)}", style="bold")]
+    if changes:
+        parts.append(tables.parameters(changes, plan.old, verbose=True)[0])
+    text = as_text.render(parts, look())
+    if to_stderr:
+        click.echo(text, err=True, nl=False)
+    else:
+        answer(text)
+    if plan.left_out:
+        shown = ", ".join(plan.left_out[:5]) + (", …" if len(plan.left_out) > 5 else "")
+        complain(f"{shown} are no compass calibration and are left out")
+    for warning in plan.warnings:
+        complain(warning)
+
+
+def agreed(count: int, *, yes: bool) -> bool:
+    """Ask for consent, where it was not given beforehand."""
+    if yes:
+        return True
+    noun = "parameter" if count == 1 else "parameters"
+    return click.confirm(f"Write {count} {noun} to the vehicle?", err=True)
+
+
+def carry_out(
+    plan: WritePlan, write: Write, backup: Path, address: str, stop: threading.Event
+) -> ExitCode:
+    """Write with progress, and say how it ended.
+
+    Raises
+    ------
+    MagcompError
+        What ``raise_for_failure`` makes of a bad outcome, other than an interruption.
+    """
+    status = StatusLine()
+    complain(f"Backup: {backup}")
+
+    def tell(event: Event) -> None:
+        match event:
+            case Progress(stage=stage, done=done, total=total):
+                status.show(_STAGES[stage], f"{done:3d}/{total:<3d}")
+            case Mismatch(name=name, wanted=wanted, received=received):
+                status.say(
+                    f"{name} must become {format_value(wanted)}; instead the vehicle keeps "
+                    f"{format_value(received)}"
+                )
+            case Restarted(why=why):
+                status.say(f"Everything is verified anew because {why}")
+            case RollingBack(why=why):
+                status.say(f"Rolling back because {why}")
+            case _:
+                pass
+
+    outcome = write(tell, stop.is_set)
+    status.clear()
+    if outcome.reason is Reason.STOPPED:
+        complain_of(outcome, backup, address)
+        return ExitCode.INTERRUPTED
+    raise_for_failure(outcome, backup, address)
+    complain(f"Written and read back: {len(plan.changes)} parameters")
+    return ExitCode.GOOD
+
+
+def complain_of(outcome: Outcome, backup: Path, address: str) -> None:
+    """Say what stands after an interruption."""
+    try:
+        raise_for_failure(outcome, backup, address)
+    except MagcompError as error:
+        complain(str(error))
