@@ -164,7 +164,7 @@ def _document(found: _Answer) -> dict[str, Any]:
         "lag_s": {"field": made.field_lag_s, "regressor": made.regressor_lag_s},
         "declination_deg": math.degrees(made.declination),
         "headings": {
-            name: {"time_s": series.time.tolist(), "deg": _numbers(_degrees(series.value))}
+            name: {"time_s": _numbers(series.time), "deg": _numbers(_degrees(series.value))}
             for name, series in found.headings.items()
         },
         "error_deg": {
@@ -195,8 +195,9 @@ def _text(found: _Answer) -> str:
         "",
         "".join([f" {'time, s':>9}", *(f"{name:>13}" for name in headings)]),
     ]
-    for moment in np.linspace(made.time[0], made.time[-1], _ROWS):
-        cells = (_at(series, float(moment)) for series in headings.values())
+    rows = np.unique(np.linspace(0, len(made.time) - 1, _ROWS).astype(int))
+    for moment in made.time[rows].tolist():
+        cells = (_at(series, moment) for series in headings.values())
         lines.append("".join([f" {moment:9.1f}", *(f"{cell:>13}" for cell in cells)]))
     return "\n".join([*lines, "", *_quality(found), ""]) + "\n"
 

@@ -137,6 +137,8 @@ class Compensator:
             pitch
         )
         right = field_y * cos_roll - field_z * sin_roll
+        if not (math.isfinite(forward) and math.isfinite(right)):
+            return math.nan
         angle = math.atan2(-right, forward) + self.declination
         return (angle + math.pi) % _TURN - math.pi
 
@@ -160,6 +162,9 @@ class Compensator:
             Radians in [−π, π), shape (n,): what :meth:`correct` returns for each row.
         """
         matrix = np.array(self._matrix).reshape(3, 3)
-        field = readings @ matrix.T + self._bias + np.multiply.outer(u, np.array(self._motor))
-        level = np.einsum("nij,nj->ni", level_matrix(roll, pitch), field)
-        return field, wrap_angle(np.arctan2(-level[:, 1], level[:, 0]) + self.declination)
+        with np.errstate(invalid="ignore"):
+            field = readings @ matrix.T + self._bias + np.multiply.outer(u, np.array(self._motor))
+            level = np.einsum("nij,nj->ni", level_matrix(roll, pitch), field)
+        known = np.isfinite(level).all(axis=1)
+        angle = np.arctan2(-level[:, 1], level[:, 0], where=known, out=np.full(len(level), np.nan))
+        return field, wrap_angle(angle + self.declination)

@@ -40,6 +40,9 @@ class Tuning:
         A compass reading pulls for this long at most when no other follows.
     gap_s
         After a longer silence of the gyro everything begins anew.
+    coast_s
+        After a longer silence of the compass the gyro's drift is worth more than its memory, and
+        the next reading is where the heading begins anew.
     memory_s
         How old a compass reading may be.
     """
@@ -49,6 +52,7 @@ class Tuning:
     most_bias: float = math.radians(3.0)
     hold_s: float = 1.5
     gap_s: float = 2.0
+    coast_s: float = 60.0
     memory_s: float = 1.0
 
 
@@ -136,7 +140,7 @@ class Fusion:
         self._heading = math.nan
         self._innovation = 0.0
         self._measured_at = -math.inf
-        self._begin_at: float | None = None
+        self._first: tuple[float, float] | None = None
         self._waiting: tuple[float, float] | None = None
 
     @property
@@ -163,7 +167,7 @@ class Fusion:
         if not math.isfinite(heading):
             return
         if math.isnan(self._heading):
-            self._begin_at = heading
+            self._first = (time, heading)
             return
         self._waiting = (time, heading)
         self._compare()
@@ -174,7 +178,8 @@ class Fusion:
         Parameters
         ----------
         time, gyro, down
-            See :class:`Motion`. A sample that is not finite, or not newer, is left out.
+            See :class:`Motion`. Left out is a sample that is not finite, or is a little older than
+            the last.
 
         Returns
         -------
@@ -188,36 +193,45 @@ class Fusion:
         gravity = gravity / size
         before, self._before = self._before, (time, rate)
         step = math.inf if before is None else time - before[0]
-        if step <= 0.0:
+        if -self.tuning.gap_s < step <= 0.0:
             self._before = before
             return self._heading
-        if step > self.tuning.gap_s or before is None:
+        # A clock that went far back is an autopilot that has started anew.
+        if abs(step) > self.tuning.gap_s or self._has_drifted(time):
             self._forget()
         if math.isnan(self._heading):
-            self._begin(time, gravity)
+            self._begin(time, rate, gravity)
             return self._heading
         if before is not None:
             # The mean of both ends: a 10 Hz gyro misses half a step of every turn otherwise.
             self._advance(time, step, 0.5 * (rate + before[1]) - self._bias, gravity)
         return self._heading
 
+    def _has_drifted(self, time: float) -> bool:
+        return math.isfinite(self._measured_at) and time - self._measured_at > self.tuning.coast_s
+
     def _forget(self) -> None:
         """After a gap nobody knows how far the vehicle has turned."""
         self._heading = math.nan
-        self._begin_at = None
+        self._first = None
         self._waiting = None
         self._history.clear()
         self._measured_at = -math.inf
 
-    def _begin(self, time: float, down: FloatArray) -> None:
-        if self._begin_at is None:
+    def _begin(self, time: float, rate: FloatArray, down: FloatArray) -> None:
+        """Start from the first reading, turned on by what the gyro says until now."""
+        if self._first is None or time - self._first[0] > self.tuning.memory_s:
             return
         roll, pitch = math.atan2(down[1], down[2]), math.asin(max(-1.0, min(1.0, -down[0])))
+        level_rate = float(rate[1] * math.sin(roll) + rate[2] * math.cos(roll))
+        turned = level_rate / max(math.cos(pitch), _LEAST_COS_PITCH) * (time - self._first[0])
+        self._heading = _wrap(self._first[1] + turned)
         self._ahrs.restart()
         self._ahrs.skip_startup()
-        self._ahrs.set_quaternion(_quaternion(roll, pitch, self._begin_at))
-        self._heading = _wrap(self._begin_at)
-        self._begin_at = None
+        self._ahrs.set_quaternion(_quaternion(roll, pitch, self._heading))
+        self._first = None
+        self._measured_at = time
+        self._innovation = 0.0
         self._history.append((time, self._heading))
 
     def _advance(self, time: float, step: float, rate: FloatArray, down: FloatArray) -> None:
