@@ -50,7 +50,7 @@ def html(made: Reproduction) -> str:
     done = {name: each for name, each in kinds.items() if each is not None}
     drawn = {name: figures(each.turntable, each.flights) for name, each in done.items()}
     body = (
-        f'<header><p class="overline">magcomp {__version__} reproduce</p>'
+        f'<header style="margin-top:2rem"><p class="overline">magcomp {__version__} reproduce</p>'
         f"<h1><span>{text(_TITLE)}</span></h1></header><main>"
         f"{_summary(numbers, done)}"
         f"<section><h2>Table 1</h2><p>{text(TURN)}</p>{_table(numbers, done)}{_methods()}"

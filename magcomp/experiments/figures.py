@@ -183,14 +183,20 @@ def headings(flown: Flights) -> Figure:
             axis("time (s)"),
             axis("heading error (°)", zeroline=True, zerolinecolor=GRID),
         ),
-        height=420,
+        height=360,
+        wide=True,
     )
 
 
 def _with_legend(layout: dict[str, Any]) -> dict[str, Any]:
     """A picture in space whose traces are named above it."""
     legend = flat({}, {})["legend"]
-    return {**layout, "showlegend": True, "legend": legend, "margin": {"t": 36}}
+    return {
+        **layout,
+        "showlegend": True,
+        "legend": legend,
+        "margin": {"l": 0, "r": 0, "t": 48, "b": 0},
+    }
 
 
 def _fine_keys() -> list[str]:

@@ -23,7 +23,7 @@ COMPENSATED = "mission_compensated.tlog"
 RECORDINGS = (TURNTABLE, UNCOMPENSATED, COMPENSATED)
 """Files of the recordings' directory that the experiments are carried out on."""
 
-_DECIMALS = 3
+_DECIMALS = 6
 
 Progress = Callable[[str, float], None]
 """What is being done, and the share done, 0 … 1."""
@@ -147,7 +147,7 @@ def _flights(flown: Flights) -> dict[str, Any]:
         name: _short({"largest_deg": course.largest_deg, "rms_deg": course.rms_deg})
         for name, course in courses.items()
     }
-    return {**errors, "paths_apart_m": round(flown.apart_m, 1)}
+    return {**errors, "paths_apart_m": round(flown.apart_m, _DECIMALS)}
 
 
 def _short(row: dict[str, Any]) -> dict[str, Any]:
