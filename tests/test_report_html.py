@@ -81,6 +81,9 @@ class TestNumbers:
     def test_the_json_is_in_the_page(self, make) -> None:
         assert content(make).json("result") == make().document
 
+    def test_the_command_it_names_gives_this_answer(self) -> None:
+        assert "--compass 1 -o compass.param" in content(flown).text
+
     def test_a_number_that_does_not_exist_is_said_in_words(self) -> None:
         assert still().document["compasses"][0]["lag_s"]["field"] is None
         assert "not visible to this method" in content(still).text

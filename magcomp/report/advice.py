@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any
 
 from magcomp.report import words
+from magcomp.session import Options
 
 GRADES = ("good", "marginal", "rejected")
 
@@ -37,8 +39,16 @@ def headline(document: Document) -> str:
     return words.sentence(", ".join(parts))
 
 
-def steps(document: Document) -> tuple[str, ...]:
-    """What to do, in order."""
+def steps(document: Document, options: Options | None = None) -> tuple[str, ...]:
+    """What to do, in order; what stands between backticks is typed as it is.
+
+    Parameters
+    ----------
+    document
+        From :func:`magcomp.report.as_json.analysis_object`.
+    options
+        What was asked for, so that the command named here gives the same answer.
+    """
     grades = by_grade(document)
     kept = [number for grade in GRADES[:2] for number in grades.get(grade, ())]
     if not kept:
@@ -46,7 +56,7 @@ def steps(document: Document) -> tuple[str, ...]:
             *(_doubt(c, "") for c in document["compasses"]),
             "Mend what the verdict names, record again, and make a new report of the new log.",
         )
-    found = [_write(document, sorted(kept))]
+    found = [_write(document, sorted(kept), options)]
     for compass in document["compasses"]:
         if compass["verdict"] == "marginal":
             found.append(_doubt(compass, "Until a better log says otherwise, fly with care"))
@@ -59,18 +69,24 @@ def steps(document: Document) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _write(document: Document, kept: list[int]) -> str:
+def _write(document: Document, kept: list[int], options: Options | None) -> str:
     where = document.get("written")
-    source = shlex.quote(document["source"])
     how = (
         f"they are in `{where}`"
         if where
-        else f"`magcomp fit {source} -o compass.param` writes them to a file"
+        else f"`{_command(document['source'], options)}` writes them to a file"
     )
     return (
         f"Disarm, then write the parameters of {words.compasses(kept)} with your ground station; "
         f"{how}. They belong to this vehicle only."
     )
+
+
+def _command(source: str, options: Options | None) -> str:
+    asked = {} if options is None else asdict(options)
+    usual = asdict(Options())
+    given = [f"--{name} {value}" for name, value in asked.items() if value != usual[name]]
+    return " ".join(["magcomp fit", shlex.quote(source), *given, "-o compass.param"])
 
 
 def _left(compass: Mapping[str, Any]) -> str:

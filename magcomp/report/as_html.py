@@ -68,7 +68,7 @@ def html(
     ]
     body = "".join(
         [
-            _head(numbers, analysis),
+            _head(numbers, analysis, options),
             _compasses(numbers, panels),
             f"<section><h2>The vehicle</h2>{html_tables.vehicle(numbers, recording)}</section>",
             f"<section><h2>The recording</h2>{html_tables.quality(recording)}"
@@ -79,11 +79,11 @@ def html(
     return _page(f"magcomp report: {analysis.source}", body, source, drawn)
 
 
-def _head(numbers: Numbers, analysis: Analysis) -> str:
+def _head(numbers: Numbers, analysis: Analysis, options: Options | None) -> str:
     """Verdict first, then what to do, then the compasses at a glance."""
     document = numbers.document
     grade = document["verdict"]
-    steps = "".join(f"<li>{with_code(step)}</li>" for step in advice.steps(document))
+    steps = "".join(f"<li>{with_code(step)}</li>" for step in advice.steps(document, options))
     return (
         f'<header class="verdict {grade}">'
         f'<p class="overline">Compass and motors · {text(analysis.source)} · '

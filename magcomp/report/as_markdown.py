@@ -8,11 +8,14 @@ from typing import Any
 from magcomp.report import advice, words
 from magcomp.report.figure import Quantity, quantity_of
 from magcomp.report.html_parts import parameter
+from magcomp.session import Options
 
 _SPECIAL = str.maketrans({sign: f"\\{sign}" for sign in "\\`*_{}[]<>#|"})
 
 
-def markdown(document: Mapping[str, Any], present: Mapping[str, float]) -> str:
+def markdown(
+    document: Mapping[str, Any], present: Mapping[str, float], options: Options | None = None
+) -> str:
     """The report as Markdown.
 
     Parameters
@@ -21,6 +24,8 @@ def markdown(document: Mapping[str, Any], present: Mapping[str, float]) -> str:
         From :func:`magcomp.report.as_json.analysis_object`, read back from its text.
     present
         Parameters as the recording left them, for the difference.
+    options
+        What was asked for.
     """
     lines = [
         f"# {advice.headline(document)}",
@@ -30,7 +35,10 @@ def markdown(document: Mapping[str, Any], present: Mapping[str, float]) -> str:
         "",
         "## What to do",
         "",
-        *(f"{number}. {_with_code(step)}" for number, step in enumerate(advice.steps(document), 1)),
+        *(
+            f"{number}. {_with_code(step)}"
+            for number, step in enumerate(advice.steps(document, options), 1)
+        ),
     ]
     for compass in document["compasses"]:
         lines += ["", *_compass(compass, present)]

@@ -210,7 +210,7 @@ def unexplained(result: CompassResult, plots: CompassPlots, quantity: Quantity) 
     each = (1.0 - bottom) / strips
     layout = flat(
         axis("time (s)", anchor="y", domain=[0.0, 1.0]),
-        axis(f"{quantity.name} ({quantity.unit})", domain=[0.0, bottom - 0.05]),
+        axis(f"{quantity.name}<br>({quantity.unit})", domain=[0.0, bottom - 0.05]),
         margin={"l": 8, "r": 12, "t": 36, "b": 8},
     )
     for index, part in enumerate(plots.parts):
@@ -226,7 +226,10 @@ def unexplained(result: CompassResult, plots: CompassPlots, quantity: Quantity) 
         )
         top = 1.0 - index * each
         layout[f"yaxis{index + 2}"] = axis(
-            part, domain=[top - each + 0.03, top], zeroline=True, zerolinecolor=MUTED
+            f"{part}<br>(mGauss)",
+            domain=[top - each + 0.03, top],
+            zeroline=True,
+            zerolinecolor=MUTED,
         )
     data.append(
         line(time, quantity.values(plots.u, 1 if quantity.scale == 1.0 else 0), "", MUTED)

@@ -246,14 +246,14 @@ def space(corners: FloatArray | None = None) -> dict[str, Any]:
 
     return {
         "scene": {
-            "xaxis": side("x forward", 0),
+            "xaxis": side("x forward (mGauss)", 0),
             # Down is drawn downwards, as the vehicle stands; reversing y too keeps the picture from
             # being a mirror image.
-            "yaxis": side("y right", 1),
-            "zaxis": side("z down", 2),
+            "yaxis": side("y right (mGauss)", 1),
+            "zaxis": side("z down (mGauss)", 2),
             "aspectmode": "data" if corners is None else "cube",
             "camera": {
-                "eye": {"x": 1.45, "y": -1.45, "z": 0.65},
+                "eye": {"x": 1.55, "y": -1.55, "z": 0.7},
                 "center": {"x": 0, "y": 0, "z": -0.08},
             },
         },

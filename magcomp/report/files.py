@@ -49,7 +49,7 @@ def report_text(
 
             history = recording.parameters
             present = {name: history.last(name, 0.0) for name in history.names}
-            return markdown(json.loads(document), present)
+            return markdown(json.loads(document), present, options)
         case ".html":
             from magcomp.report.as_html import html  # noqa: PLC0415
 

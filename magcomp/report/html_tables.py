@@ -13,6 +13,7 @@ from magcomp.report.figure import Quantity, quantity_of
 from magcomp.report.html_parts import DASH, Numbers, badge, facts, minus, parameter, table, text
 
 _MOST_DECIMALS = 4
+_COARSE_DEG = 0.1
 _NEARLY = 1.05
 """A row this little above the range the log covers still counts as covered."""
 
@@ -25,7 +26,9 @@ def overview(numbers: Numbers) -> str:
         row = _covered_row(compass)
         key = ("compasses", index, "heading_error_deg", row)
         u = numbers.show(*key, "u", decimals=0, scale=quantity.scale)
-        before, bound = (numbers.show(*key, name, decimals=1) for name in ("before", "p95"))
+        # A bound must not be rounded to nothing.
+        fine = 1 if numbers.at(*key, "p95") >= _COARSE_DEG else 2
+        before, bound = (numbers.show(*key, name, decimals=fine) for name in ("before", "p95"))
         residual = ("compasses", index, "field_residual_mgauss")
         was, left = (
             numbers.show(*residual, name, decimals=1) for name in ("held_out_before", "held_out")

@@ -81,6 +81,8 @@
   const draw = async (canvas) => {
     try {
       const { data, layout, config } = figure(canvas, theme());
+      // A picture in space fills its height, so a narrow one must be lower.
+      if (layout.scene) canvas.style.maxHeight = `${Math.round(canvas.clientWidth * 0.95)}px`;
       await Plotly.newPlot(canvas, data, layout, config);
       canvas.dataset.state = "drawn";
       // What a graphics card drew does not print, so such a figure keeps a picture of itself.
