@@ -12,7 +12,14 @@ from magcomp.autopilot import ardupilot
 from magcomp.earth import EarthField
 from magcomp.errors import FitRejectedError, MissingDataError, UsageError
 from magcomp.fit import Problem, fit
-from magcomp.fit.flight import is_physical, prior
+from magcomp.fit.flight import (
+    SIZE,
+    TRUSTED_OFFSET_MGAUSS,
+    is_physical,
+    lags_of,
+    prior,
+    strength_and_dip,
+)
 from magcomp.model import MotorFit, Series, pack
 
 NOTHING = {
@@ -82,6 +89,45 @@ def test_wild_readings_do_not_move_the_answer():
     dirty = fit(problem_of(replace(recording, field={1: Series(field.time, value)})), "flight")
     moved = np.linalg.norm(dirty.interference - clean.interference)
     assert moved < 0.02 * np.linalg.norm(INTERFERENCE)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_poor_flight_leans_on_the_calibration_in_force(seed):
+    """Hardly tilted, hardly turned: strength and dip alone cannot tell the offsets."""
+    found = fit(Flown(seed=seed, seconds=40.0, tilt=0.03, noise=3.0).problem(), "flight")
+    assert np.linalg.norm(found.correction.offset - EXACT.offset) < 3 * TRUSTED_OFFSET_MGAUSS
+    assert np.allclose(found.correction.soft_iron, EXACT.soft_iron, atol=1e-5)
+
+
+# --- the model's derivatives -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("compensated", [False, True], ids=["off", "current in force"])
+def test_the_stated_derivatives_are_those_of_the_residuals(compensated):
+    """All sixteen: motor, offset, soft iron, strength, dip and both lags."""
+    in_force = None
+    if compensated:
+        wrong = replace(EXACT, motor=np.array([3.0, 2.0, -1.0]))
+        in_force = {"COMPASS_MOTCT": 2.0, **ardupilot.correction_parameters(wrong, 1, 1.0)}
+    # Slow and finely sampled, so that half a step of a lag is as smooth as the formulas.
+    flown = Flown(in_force=in_force, noise=0.0, current_hz=50.0, slow_s=30.0, fast_s=10.0)
+    problem = flown.problem()
+    at = prior(problem, 4).mean
+    at[:12] = pack(EXACT)
+
+    def residuals(parameters: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return strength_and_dip(problem.sample(lags_of(parameters)), parameters)
+
+    _, stated = residuals(at)
+    steps = np.concatenate(
+        [np.full(3, 1e-3), np.full(3, 1e-2), np.full(6, 1e-5), [1e-2, 1e-5, 0.04, 0.04]]
+    )
+    inside = slice(10, -10)
+    for index, step in enumerate(steps):
+        shift = step * np.eye(SIZE)[index]
+        measured = (residuals(at + shift)[0] - residuals(at - shift)[0]) / (2 * step)
+        error = np.abs(measured - stated[:, :, index])[inside]
+        assert error.max() <= 0.03 * np.abs(measured).max() + 1e-6, index
 
 
 # --- what rotating, scaling and shuffling do --------------------------------------------------
