@@ -154,25 +154,6 @@ def test_progress_is_shown_on_a_terminal_and_kept_out_of_the_data() -> None:
     assert b"fitting compass" in shown
 
 
-def test_the_demo_needs_only_a_checkout(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert run(["demo"]) == 0
-    out = capsys.readouterr().out
-    assert "the truth" in out
-    assert "COMPASS_MOT3" in out
-
-
-def test_the_demo_says_what_it_needs_where_it_is_not(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(magcomp, "__file__", str(tmp_path / "magcomp" / "__init__.py"))
-    assert run(["demo"]) == 2
-    assert "sitl_fixtures" in capsys.readouterr().err
-
-
 def test_the_demo_s_truth_is_that_of_the_file() -> None:
     recording = read(FIXTURES / "flight.tlog")
     parameters = {name: recording.parameters.last(name, 0.0) for name in recording.parameters.names}

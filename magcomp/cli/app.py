@@ -37,7 +37,8 @@ COMMANDS = {
     "upload": _Command("magcomp.cli.upload", "Write a parameter file to a vehicle, and prove it."),
     "restore": _Command("magcomp.cli.restore", "Bring a vehicle back to a backup."),
     "simulate": _Command("magcomp.cli.simulate", "Be a vehicle to try everything on."),
-    "demo": _Command("magcomp.cli.demo", "Fit a recorded flight whose truth is known."),
+    "tui": _Command("magcomp.cli.tui", "All of it on one screen, for a laptop in a field."),
+    "demo": _Command("magcomp.cli.demo", "The whole job on a simulated vehicle, proven."),
 }
 
 

@@ -11,6 +11,7 @@ from magcomp.cli.linking import stop_on_interrupt
 from magcomp.cli.output import answer, complain
 from magcomp.errors import ExitCode
 from magcomp.link import read_signing_key
+from magcomp.parameters.files import read_parameter_file
 from magcomp.simulate import PROGRAMS, Faults, Vehicle, scenario, serve
 
 _ADDRESS = "udpout:127.0.0.1:14550"
@@ -57,6 +58,12 @@ _ADDRESS = "udpout:127.0.0.1:14550"
     help="Write what the vehicle really is.",
 )
 @click.option(
+    "--parameters",
+    type=click.Path(path_type=Path),
+    metavar="FILE.param",
+    help="What it holds when it is switched on.",
+)
+@click.option(
     "--signing-key",
     type=click.Path(path_type=Path),
     metavar="FILE",
@@ -70,6 +77,7 @@ def simulate(
     loss: float,
     latency: float,
     truth: Path | None,
+    parameters: Path | None,
     signing_key: Path | None,
 ) -> ExitCode:
     """Be an ArduCopter with three compasses, reached at ADDRESS (udpout:127.0.0.1:14550).
@@ -81,7 +89,14 @@ def simulate(
     faults = Faults(loss=loss, latency_s=latency) if loss or latency else None
     key = None if signing_key is None else read_signing_key(signing_key)
     chosen = scenario(program, seed)
-    vehicle = Vehicle(chosen, start_unix_s=time.time(), wait_for_ground=True, signing_key=key)
+    held = {} if parameters is None else read_parameter_file(parameters).values
+    vehicle = Vehicle(
+        chosen,
+        start_unix_s=time.time(),
+        wait_for_ground=True,
+        signing_key=key,
+        parameters=held,
+    )
     if truth is not None:
         chosen.truth.write(truth)
 

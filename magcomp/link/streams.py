@@ -53,8 +53,10 @@ _GROUPS = {
     "ATTITUDE": mavlink.MAV_DATA_STREAM_EXTRA1,
     "VFR_HUD": mavlink.MAV_DATA_STREAM_EXTRA2,
     "BATTERY_STATUS": mavlink.MAV_DATA_STREAM_EXTRA3,
+    # A simulation's truth, which demonstrations compare with; no fit ever sees it.
+    "SIMSTATE": mavlink.MAV_DATA_STREAM_EXTRA1,
 }
-"""ArduPilot's stream groups of the messages above."""
+"""ArduPilot's stream groups of the messages that can be asked for."""
 
 _IDS = {
     message.msgname: number
