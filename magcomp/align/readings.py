@@ -7,10 +7,7 @@ import numpy as np
 from magcomp.autopilot import ardupilot
 from magcomp.errors import MissingDataError
 from magcomp.model import (
-    CURRENT,
-    THROTTLE,
     BoolArray,
-    Correction,
     FloatArray,
     InForce,
     Readings,
@@ -23,12 +20,6 @@ PARAMETER_SETTLE_S = 1.5
 
 ARMED_ENOUGH_S = 30.0
 """With this much armed time, disarmed time (carried about, parked on steel) is left out."""
-
-_REGRESSOR = {
-    ardupilot.MotorCompensation.OFF: None,
-    ardupilot.MotorCompensation.THROTTLE: THROTTLE,
-    ardupilot.MotorCompensation.CURRENT: CURRENT,
-}
 
 
 def readings(
@@ -141,15 +132,6 @@ def _corrections(recording: Recording, compass: int) -> tuple[tuple[InForce, ...
         if previous is not None and calibration.same_as(previous):
             continue
         previous = calibration
-        in_force.append(
-            InForce(
-                correction=Correction(
-                    offset=calibration.offset,
-                    soft_iron=calibration.scale * calibration.soft_iron,
-                    motor=calibration.motor,
-                ),
-                regressor=_REGRESSOR[calibration.compensation],
-            )
-        )
+        in_force.append(ardupilot.in_force(calibration))
         starts.append(moment)
     return tuple(in_force), np.array(starts[1:])

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from magcomp.errors import ParameterFileError
-from magcomp.model import CURRENT, THROTTLE, Correction, ParameterHistory
+from magcomp.model import CURRENT, THROTTLE, Correction, InForce, ParameterHistory
 
 FloatArray = NDArray[np.float64]
 
@@ -50,6 +50,8 @@ class MotorCompensation(IntEnum):
 
 COMPENSATION_OF = {CURRENT: MotorCompensation.CURRENT, THROTTLE: MotorCompensation.THROTTLE}
 """COMPASS_MOTCT that makes the autopilot multiply by a control quantity."""
+
+_REGRESSOR_OF = {switch: kind for kind, switch in COMPENSATION_OF.items()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,6 +137,18 @@ def vector_parameters(kind: str, compass: int, vector: ArrayLike) -> dict[str, f
         name: float(np.float32(value))
         for name, value in zip(vector_names(kind, compass), values, strict=True)
     }
+
+
+def in_force(calibration: Calibration) -> InForce:
+    """What a calibration does to a reading, in magcomp's own terms."""
+    return InForce(
+        correction=Correction(
+            offset=calibration.offset,
+            soft_iron=calibration.scale * calibration.soft_iron,
+            motor=calibration.motor,
+        ),
+        regressor=_REGRESSOR_OF.get(calibration.compensation),
+    )
 
 
 def correction_parameters(correction: Correction, compass: int, scale: float) -> dict[str, float]:

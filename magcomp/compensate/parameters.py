@@ -5,13 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from magcomp.autopilot import ardupilot
-from magcomp.model import CURRENT, THROTTLE, Correction, InForce
-
-_REGRESSORS = {
-    ardupilot.MotorCompensation.OFF: None,
-    ardupilot.MotorCompensation.THROTTLE: THROTTLE,
-    ardupilot.MotorCompensation.CURRENT: CURRENT,
-}
+from magcomp.model import InForce
 
 
 def from_parameters(values: Mapping[str, float], compass: int) -> InForce:
@@ -24,10 +18,4 @@ def from_parameters(values: Mapping[str, float], compass: int) -> InForce:
     compass
         1, 2 or 3.
     """
-    calibration = ardupilot.calibration(values, compass)
-    correction = Correction(
-        offset=calibration.offset,
-        soft_iron=calibration.scale * calibration.soft_iron,
-        motor=calibration.motor,
-    )
-    return InForce(correction, _REGRESSORS[calibration.compensation])
+    return ardupilot.in_force(ardupilot.calibration(values, compass))

@@ -8,10 +8,9 @@ from typing import Literal
 
 import numpy as np
 
-from magcomp.align import controls, interpolate, readings, reported
+from magcomp.align import controls, expected_earth, interpolate, readings, reported
 from magcomp.compensate.compensator import Compensator
 from magcomp.compensate.fusion import Fusion, Motion, Reading, Tuning, fuse
-from magcomp.earth import EarthField, expected_field
 from magcomp.errors import MissingDataError
 from magcomp.fit import Problem, best_form
 from magcomp.fit.flight import estimate_lags
@@ -97,7 +96,7 @@ def track(
     The lags are estimated from strength and dip of the corrected field, which no heading
     enters. Without a position the declination is taken as 0.
     """
-    earth = earth_of(recording)
+    earth = expected_earth(recording)
     new = readings(recording, compass, start=start, end=end)
     found = controls(recording)
     forms = [control for control in found if control.kind == regressor]
@@ -124,23 +123,6 @@ def track(
         regressor_lag_s=lags.regressor,
         declination=earth.declination,
     )
-
-
-def earth_of(recording: Recording) -> EarthField:
-    """Expected field where the recording was made; made of its own readings without a position."""
-    if recording.position is not None and len(recording.position):
-        latitude, longitude, altitude = np.median(recording.position.value, axis=0)
-        return expected_field(latitude, longitude, altitude, recording.start_unix_s)
-    if not recording.field or recording.attitude is None:
-        raise MissingDataError(
-            f"{recording.source} must hold a compass and the attitude; instead one is missing"
-        )
-    first = recording.field[min(recording.field)]
-    attitude = interpolate(recording.attitude, first.time)
-    down = gravity_direction(attitude[:, 0], attitude[:, 1])
-    strength = float(np.median(np.linalg.norm(first.value, axis=1)))
-    vertical = float(np.median(np.einsum("ij,ij->i", first.value, down)))
-    return EarthField(strength, float(np.arcsin(np.clip(vertical / strength, -1.0, 1.0))), 0.0)
 
 
 def _fused(

@@ -25,8 +25,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from magcomp.align import controls, readings, reported
-from magcomp.compensate.track import earth_of
+from magcomp.align import controls, expected_earth, readings, reported
 from magcomp.earth import EarthField
 from magcomp.errors import MissingDataError
 from magcomp.experiments.methods import METHODS, Corrections, corrections
@@ -155,7 +154,7 @@ def turntable(recording: Recording, truth: Truth, compass: int = 1) -> Turntable
         Where the recording is not of this experiment.
     """
     spans = _measured_turns(recording, truth)
-    earth = earth_of(recording)
+    earth = expected_earth(recording)
     found = reported(controls(recording))
     if CURRENT not in found:
         raise MissingDataError(

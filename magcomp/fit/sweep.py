@@ -138,7 +138,7 @@ def _answer(
         vertical=float(np.median(np.einsum("ij,ij->i", corrected, samples.down))),
         noise=noise,
         levels=levels,
-        line=line_through(levels),
+        line=line_through(levels) if len(levels) > 1 else None,
         u_low=float(np.quantile(samples.u, 0.02)),
         u_high=float(np.quantile(samples.u, 0.98)),
         count=len(samples),

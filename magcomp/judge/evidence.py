@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from magcomp.errors import FitRejectedError
 from magcomp.fit import Problem, departures, folds, refit, residuals, spread
 from magcomp.geometry import heading
 from magcomp.model import Coverage, FieldResidual, FloatArray, Lags, MotorFit, Samples
@@ -11,6 +12,7 @@ from magcomp.model import Coverage, FieldResidual, FloatArray, Lags, MotorFit, S
 _SPHERE_BANDS, _SPHERE_SECTORS = 6, 12
 _HEADING_SECTORS = 24
 _GAP_S = 2.0
+_LEAST_FOLDS = 3
 
 
 def used_lags(fit: MotorFit) -> Lags:
@@ -40,10 +42,19 @@ def field_residual(problem: Problem, fit: MotorFit) -> tuple[FieldResidual, Floa
         seen = samples.where(fold != index)
         if not len(unseen) or len(seen) < 3:
             continue
-        part = refit(problem, fit, fold != index)
+        try:
+            part = refit(problem, fit, fold != index)
+        except FitRejectedError:
+            continue
         left.append(_left(part, seen, unseen))
         before_left.append(_left_before(fit, seen, unseen))
         motors.append(part.correction.motor)
+    if len(motors) < _LEAST_FOLDS:
+        raise FitRejectedError(
+            f"A fit needs at least {_LEAST_FOLDS} stretches that can be held out in turn; instead "
+            f"compass {fit.compass} has {len(motors)}: record longer, with the "
+            f"{problem.control.kind} changing throughout"
+        )
     return (
         FieldResidual(
             before=spread(_left_before(fit, samples, samples)),

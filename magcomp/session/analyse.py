@@ -7,12 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from magcomp.align import controls, readings, reported
+from magcomp.align import controls, expected_earth, has_position, readings, reported
 from magcomp.autopilot import ardupilot
-from magcomp.earth import EarthField, expected_field
+from magcomp.earth import EarthField
 from magcomp.errors import MissingDataError, UsageError
 from magcomp.fit import METHODS, Problem, best_form, fit
-from magcomp.geometry import gravity_direction
 from magcomp.judge import judge, judge_present
 from magcomp.model import (
     CURRENT,
@@ -105,7 +104,7 @@ def analyse(
     wanted = Options() if options is None else options
     found = _controls_of(recording)
     kinds = _kinds(recording, found, wanted)
-    earth, notes = expected_earth(recording)
+    earth = expected_earth(recording)
     compasses = _compasses(recording, wanted)
     steps = len(kinds) * len(compasses)
     judged: dict[str, list[_Judged]] = {}
@@ -136,7 +135,7 @@ def analyse(
             )
             for j in judged[chosen]
         ),
-        notes=(*notes, *_notes(recording, judged, chosen)),
+        notes=tuple(_notes(recording, judged, chosen)),
     )
 
 
@@ -150,7 +149,7 @@ def check(recording: Recording, options: Options | None = None) -> Mapping[int, 
     """
     wanted = Options() if options is None else options
     found = _controls_of(recording)
-    earth, _ = expected_earth(recording)
+    earth = expected_earth(recording)
     by_kind = reported(found)
     verdicts = {}
     for compass in _compasses(recording, wanted):
@@ -251,27 +250,6 @@ def _compasses(recording: Recording, wanted: Options) -> list[int]:
     return left
 
 
-def expected_earth(recording: Recording) -> tuple[EarthField, list[str]]:
-    """The expected field at the recording's own position and date, else one like the readings."""
-    if recording.position is not None and len(recording.position):
-        latitude, longitude, altitude = np.median(recording.position.value, axis=0)
-        return expected_field(latitude, longitude, altitude, recording.start_unix_s), []
-    first = recording.field[min(recording.field)] if recording.field else None
-    if first is None or recording.attitude is None:
-        raise MissingDataError(
-            f"{recording.source} must hold a compass and the attitude; instead one is missing"
-        )
-    columns = [
-        np.interp(first.time, recording.attitude.time, recording.attitude.value[:, axis])
-        for axis in (0, 1)
-    ]
-    strength = float(np.median(np.linalg.norm(first.value, axis=1)))
-    vertical = float(np.median(np.einsum("ij,ij->i", first.value, gravity_direction(*columns))))
-    return EarthField(strength, float(np.arcsin(np.clip(vertical / strength, -1, 1))), 0.0), [
-        "the log holds no position: the earth's field is taken from the readings themselves"
-    ]
-
-
 def _choose(judged: Mapping[str, list[_Judged]]) -> str:
     """The control quantity that predicts held-out data better; current where it is close."""
 
@@ -295,6 +273,8 @@ def _notes(recording: Recording, judged: Mapping[str, list[_Judged]], chosen: st
         yield f"{chosen} is used because it is the better choice on held-out data: {scores}"
     elif chosen == THROTTLE and recording.current is None:
         yield "the log holds no battery current, so throttle is used"
+    if not has_position(recording):
+        yield "the log holds no position: the earth's field is taken from the readings themselves"
     if recording.vehicle.kind not in ("copter", "unknown"):
         yield (
             f"the vehicle is a {recording.vehicle.kind}: magcomp is made for multirotors, whose "

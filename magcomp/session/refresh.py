@@ -10,11 +10,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from magcomp.align import controls, readings, reported
+from magcomp.align import controls, expected_earth, readings, reported
 from magcomp.errors import MagcompError
 from magcomp.fit import Problem, refit
 from magcomp.model import Analysis, MotorFit, Recording
-from magcomp.session.analyse import expected_earth
 
 MOST_READINGS = 600
 """Readings of one compass a refresh looks at; evenly spread over the recording."""
@@ -40,7 +39,7 @@ def refresh(
         Without the compasses that cannot be fitted at the moment.
     """
     found = controls(recording)
-    earth, _ = expected_earth(recording)
+    earth = expected_earth(recording)
     fits = {}
     for result in last.compasses:
         before = result.fit
