@@ -1,0 +1,42 @@
+"""The earth's field a recording should show."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from magcomp.align.sample import interpolate
+from magcomp.earth import EarthField, expected_field
+from magcomp.errors import MissingDataError
+from magcomp.geometry import gravity_direction
+from magcomp.model import Recording
+
+
+def expected_earth(recording: Recording) -> EarthField:
+    """Expected field at the recording's own position and date.
+
+    Without a position the field is one like the readings themselves: their median strength and
+    vertical part, declination 0.
+
+    Raises
+    ------
+    MissingDataError
+        Where position and compass, or position and attitude, are missing.
+    """
+    if has_position(recording) and recording.position is not None:
+        latitude, longitude, altitude = np.median(recording.position.value, axis=0)
+        return expected_field(latitude, longitude, altitude, recording.start_unix_s)
+    if not recording.field or recording.attitude is None:
+        raise MissingDataError(
+            f"{recording.source} must hold a compass and the attitude; instead one is missing"
+        )
+    first = recording.field[min(recording.field)]
+    attitude = interpolate(recording.attitude, first.time)
+    down = gravity_direction(attitude[:, 0], attitude[:, 1])
+    strength = float(np.median(np.linalg.norm(first.value, axis=1)))
+    vertical = float(np.median(np.einsum("ij,ij->i", first.value, down)))
+    return EarthField(strength, float(np.arcsin(np.clip(vertical / strength, -1.0, 1.0))), 0.0)
+
+
+def has_position(recording: Recording) -> bool:
+    """Whether the recording says where it was made."""
+    return recording.position is not None and len(recording.position) > 0
