@@ -1,0 +1,202 @@
+"""Each compass's heading as it was and as it is corrected, side by side, from one snapshot."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from magcomp.autopilot import ardupilot
+from magcomp.geometry import heading
+from magcomp.model import THROTTLE, Analysis
+from magcomp.session.snapshot import CompassNow, LiveSnapshot
+from magcomp.tui.work import Work, Writing
+
+
+@dataclass(frozen=True)
+class HeadingPair:
+    """One compass, degrees; None where not known.
+
+    Attributes
+    ----------
+    compass
+        1, 2 or 3.
+    before, after
+        With the calibration from before, and with the fit.
+    moved_before, moved_after
+        How far each has moved since the mark, −180 … 180.
+    largest_before, largest_after
+        The largest of these since the mark, without sign.
+    """
+
+    compass: int
+    before: float | None
+    after: float | None
+    moved_before: float | None = None
+    moved_after: float | None = None
+    largest_before: float | None = None
+    largest_after: float | None = None
+
+    @property
+    def correction(self) -> float | None:
+        """What the new calibration takes out of the heading at this moment, degrees."""
+        return _apart(self.after, self.before)
+
+
+@dataclass(frozen=True)
+class HeadingTrace:
+    """How far a compass's headings have moved since the mark, in time.
+
+    Attributes
+    ----------
+    seconds
+        Before now, so from −60 to 0.
+    before, after
+        Degrees; NaN where not known.
+    """
+
+    seconds: tuple[float, ...]
+    before: tuple[float, ...]
+    after: tuple[float, ...]
+
+
+TRACE_S = 60.0
+
+
+class HeadingWatch:
+    """Remembers the headings at the mark, and how far they have moved since."""
+
+    def __init__(self) -> None:
+        self._times: deque[tuple[float, tuple[HeadingPair, ...]]] = deque()
+        self._mark: dict[int, tuple[float | None, float | None]] | None = None
+        self._largest: dict[int, tuple[float | None, float | None]] = {}
+
+    @property
+    def marked(self) -> bool:
+        """There is a mark."""
+        return self._mark is not None
+
+    def mark(self, pairs: tuple[HeadingPair, ...]) -> None:
+        """Measure from here."""
+        self._mark = {pair.compass: (pair.before, pair.after) for pair in pairs}
+        self._largest = {}
+        self._times.clear()
+
+    def look(self, pairs: tuple[HeadingPair, ...], now: float) -> tuple[HeadingPair, ...]:
+        """The pairs with how far they have moved; ``now`` in seconds."""
+        if self._mark is None:
+            return pairs
+        moved = tuple(map(self._moved, pairs))
+        self._times.append((now, moved))
+        while now - self._times[0][0] > TRACE_S:
+            self._times.popleft()
+        return moved
+
+    def trace(self, compass: int) -> HeadingTrace:
+        """The last minute of one compass."""
+        last = self._times[-1][0] if self._times else 0.0
+        rows = [
+            (time - last, _known(pair.moved_before), _known(pair.moved_after))
+            for time, pairs in self._times
+            for pair in pairs
+            if pair.compass == compass
+        ]
+        seconds, before, after = zip(*rows, strict=True) if rows else ((), (), ())
+        return HeadingTrace(seconds, before, after)
+
+    def _moved(self, pair: HeadingPair) -> HeadingPair:
+        marked = (self._mark or {}).get(pair.compass, (None, None))
+        moved = (_apart(pair.before, marked[0]), _apart(pair.after, marked[1]))
+        largest = self._largest.get(pair.compass, (None, None))
+        largest = (_larger(largest[0], moved[0]), _larger(largest[1], moved[1]))
+        self._largest[pair.compass] = largest
+        return HeadingPair(pair.compass, pair.before, pair.after, *moved, *largest)
+
+
+def heading_pairs(live: LiveSnapshot, work: Work, writing: Writing) -> tuple[HeadingPair, ...]:
+    """Before and after for every compass that reports.
+
+    Notes
+    -----
+    The vehicle reports with what is in force: before writing that is the old calibration, after
+    it the new one. The other one is found by undoing what is in force (AUTOPILOTS.md).
+    """
+    return tuple(_pair(compass, live, work, writing) for compass in live.compasses)
+
+
+def _pair(now: CompassNow, live: LiveSnapshot, work: Work, writing: Writing) -> HeadingPair:
+    if writing.in_force:
+        return HeadingPair(
+            now.number, _with(now, live, writing.in_force, writing.before), now.heading_deg
+        )
+    after = now.heading_corrected_deg
+    if work.analysis is not None:
+        after = _with_fit(now, live, work.present, work.analysis)
+    return HeadingPair(now.number, now.heading_deg, after)
+
+
+def _with(
+    now: CompassNow,
+    live: LiveSnapshot,
+    in_force: Mapping[str, float],
+    wanted: Mapping[str, float],
+) -> float | None:
+    """Heading with another calibration than the one in force."""
+    held, other = (ardupilot.calibration(values, now.number) for values in (in_force, wanted))
+    u_held, u_other = _u(held, live), _u(other, live)
+    if u_held is None or u_other is None:
+        return None
+    raw = ardupilot.uncorrect(np.array(now.field), np.array(u_held), held)
+    return _heading(ardupilot.correct(raw, np.array(u_other), other), live)
+
+
+def _with_fit(
+    now: CompassNow, live: LiveSnapshot, in_force: Mapping[str, float], analysis: Analysis
+) -> float | None:
+    """Heading with a fit that is not written yet."""
+    result = next((c for c in analysis.compasses if c.fit.compass == now.number), None)
+    held = ardupilot.calibration(in_force, now.number)
+    u_held = _u(held, live)
+    if result is None or u_held is None:
+        return None
+    u = live.throttle if result.fit.regressor == THROTTLE else live.current
+    if u is None:
+        return None
+    raw = ardupilot.uncorrect(np.array(now.field), np.array(u_held), held)
+    return _heading(result.fit.correction.apply(raw[None, :], np.array([u]))[0], live)
+
+
+def _u(calibration: ardupilot.Calibration, live: LiveSnapshot) -> float | None:
+    """What the autopilot multiplies by; 0 where its compensation is off, None where not known."""
+    by = {
+        ardupilot.MotorCompensation.OFF: 0.0,
+        ardupilot.MotorCompensation.THROTTLE: live.throttle,
+        ardupilot.MotorCompensation.CURRENT: live.current,
+    }
+    return by[calibration.compensation]
+
+
+def _heading(field: ardupilot.FloatArray, live: LiveSnapshot) -> float | None:
+    if live.attitude_deg is None:
+        return None
+    roll, pitch, _ = np.radians(live.attitude_deg)
+    return math.degrees(float(heading(field, roll, pitch))) % 360.0
+
+
+def _apart(one: float | None, other: float | None) -> float | None:
+    if one is None or other is None:
+        return None
+    return (one - other + 180.0) % 360.0 - 180.0
+
+
+def _larger(largest: float | None, moved: float | None) -> float | None:
+    if moved is None:
+        return largest
+    return abs(moved) if largest is None else max(largest, abs(moved))
+
+
+def _known(value: float | None) -> float:
+    return math.nan if value is None else value

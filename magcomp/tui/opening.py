@@ -1,0 +1,169 @@
+"""Opening a log or a vehicle, watching the vehicle come, and closing it again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from magcomp.errors import MagcompError
+from magcomp.link import Replay, SerialPort, parse_address
+from magcomp.model import Recording
+from magcomp.report import words
+from magcomp.tui.choices import choices
+from magcomp.tui.screens.dialogs import AskText, Confirm
+from magcomp.tui.services import Progress, Session, Simulation, judge_present
+from magcomp.tui.vehicle_card import VehicleCard, card_of_recording
+from magcomp.tui.work import Work, Writing
+
+if TYPE_CHECKING:
+    from magcomp.tui.app import MagcompApp
+
+
+def scan_ports(app: MagcompApp) -> None:
+    """Look for serial ports, and show everything that can be chosen."""
+
+    def scan() -> None:
+        ports = tuple(app.services.ports())
+        app.call_from_thread(_show, app, ports)
+
+    app.run_worker(scan, thread=True, exclusive=True, group="ports", exit_on_error=False)
+
+
+def _show(app: MagcompApp, ports: tuple[SerialPort, ...]) -> None:
+    app.choices = choices(ports, app.remembered.recent)
+    app.redraw()
+
+
+def ask_log(app: MagcompApp) -> None:
+    """Ask for the path of a log."""
+    recent = (name for name in app.remembered.recent if name.lower().endswith(".tlog"))
+    dialog = AskText("Open a log", "The path of a .tlog.", (("Log", next(recent, "")),))
+    app.push_screen(dialog, lambda answer: open_target(app, answer[0]) if answer else None)
+
+
+def open_target(app: MagcompApp, target: str) -> None:
+    """Open a log, or connect to an address."""
+    if not target:
+        return
+    try:
+        address = None if Path(target).expanduser().is_file() else parse_address(target)
+    except MagcompError as error:
+        app.complain(error)
+        return
+    if address is None or isinstance(address, Replay):
+        _when_free(app, lambda: _open_log(app, Path(target).expanduser()))
+    else:
+        _when_free(app, lambda: _connect(app, target))
+
+
+def simulate(app: MagcompApp) -> None:
+    """Start a simulated vehicle and connect to it."""
+
+    def started(simulation: Simulation) -> None:
+        app.simulation = simulation
+        _connect(app, simulation.address)
+
+    _when_free(
+        app,
+        lambda: app.run_task(
+            "starting the simulated vehicle", lambda _: app.services.simulate(), started
+        ),
+    )
+
+
+def leave(app: MagcompApp) -> None:
+    """Close vehicle or log; ask where results would be lost."""
+    if app.work.source:
+        _when_free(app, lambda: None)
+
+
+def close(app: MagcompApp) -> None:
+    """Give everything back; may take a moment."""
+    session, simulation = app.session, app.simulation
+    app.session = app.simulation = None
+    if session is not None:
+        session.close()
+    if simulation is not None:
+        simulation.stop()
+
+
+def _when_free(app: MagcompApp, then: Callable[[], None]) -> None:
+    """Let go of what is open, then go on."""
+
+    def free() -> None:
+        app.switch_mode("connect")
+        app.live = None
+        app.writing = Writing()
+        app.set_work(Work())
+        if app.session is None and app.simulation is None:
+            then()
+            return
+        app.run_task("disconnecting", lambda _: close(app), lambda _: then())
+
+    if not app.work.unwritten:
+        free()
+        return
+    question = "The results are not written anywhere yet. Let go of them?"
+    dialog = Confirm("Close?", question, yes="Close", no="Stay")
+    app.push_screen(dialog, lambda sure: free() if sure else None)
+
+
+# ------------------------------------------------------------------------ a log
+
+
+def _open_log(app: MagcompApp, path: Path) -> None:
+    def task(progress: Progress) -> tuple[Recording, VehicleCard]:
+        progress("", 0.1)
+        recording = app.services.read(path, app.system)
+        progress("judging the calibration in force", 0.5)
+        return recording, card_of_recording(recording, judge_present(recording))
+
+    def then(found: tuple[Recording, VehicleCard]) -> None:
+        recording, card = found
+        app.remember_target(str(path))
+        app.set_work(Work(source=str(path), card=card, recording=recording))
+
+    app.run_task(f"reading {path.name}", task, then)
+
+
+# ------------------------------------------------------------------------ a vehicle
+
+
+def _connect(app: MagcompApp, address: str) -> None:
+    def task(_: Progress) -> Session:
+        record = app.services.new_file("recording", ".tlog", None)
+        record.parent.mkdir(parents=True, exist_ok=True)
+        return app.services.open_live(address, record, app.system)
+
+    def then(session: Session) -> None:
+        app.session = session
+        if app.simulation is None:
+            app.remember_target(address)
+        app.set_work(Work(source=address, live=True))
+        app.tick()
+
+    app.run_task(f"opening {address}", task, then)
+
+
+def watch_vehicle(app: MagcompApp) -> None:
+    """Make the vehicle's card once its calibration is read; keep its warnings fresh."""
+    live, session, work = app.live, app.session, app.work
+    if live is None or session is None or live.vehicle is None:
+        return
+    if work.card is None and live.ready and app.busy is None:
+
+        def then(recording: Recording) -> None:
+            card = card_of_recording(recording)
+            facts = tuple(fact for fact in card.facts if fact[0] != "Readings")
+            shown = replace(card, facts=facts, warnings=_warnings(app))
+            app.set_work(replace(app.work, card=shown, recording=recording))
+
+        app.run_task("reading the calibration", lambda _: session.recording(), then)
+    elif work.card is not None and work.card.warnings != _warnings(app):
+        app.work = replace(work, card=replace(work.card, warnings=_warnings(app)))
+
+
+def _warnings(app: MagcompApp) -> tuple[str, ...]:
+    return () if app.live is None else tuple(map(words.sentence, app.live.warnings))

@@ -1,0 +1,157 @@
+"""What the pictures of the fit show, as plain numbers: made once a fit, drawn often."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+
+from magcomp.model import CURRENT, CompassResult, FloatArray
+from magcomp.report import words
+from magcomp.report.evidence import CompassPlots
+
+AXES = ("x", "y", "z")
+AXIS_WORDS = ("forward", "right", "down")
+
+
+@dataclass(frozen=True)
+class ErrorRow:
+    """Largest heading error at one control quantity, degrees.
+
+    Attributes
+    ----------
+    label
+        ``20 A`` or ``40 %``.
+    before, after, bound
+        Now, corrected, and corrected at most with 95 % probability.
+    covered
+        The recording reached this control quantity.
+    """
+
+    label: str
+    before: float
+    after: float
+    bound: float
+    covered: bool
+
+
+def error_rows(result: CompassResult) -> tuple[ErrorRow, ...]:
+    """Heading error by control quantity, as the judge found it."""
+    covered = result.verdict.coverage
+    return tuple(
+        ErrorRow(
+            words.quantity(row.u, result.fit.regressor),
+            row.before,
+            row.after,
+            row.p95,
+            row.u <= covered.u_high or row.u == 0.0,
+        )
+        for row in result.verdict.heading_error
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Shift:
+    """The paper's picture: how far the centre moves, by control quantity, an axis a line.
+
+    Attributes
+    ----------
+    u
+        Control quantity of each centre, amperes or per cent, shape (k,).
+    centres
+        Shift of each centre from its place at rest, in the corrected field, mGauss, shape (k, 3).
+    ends
+        Control quantities at which the lines begin and end, shape (2,).
+    lines
+        The fitted interference there, mGauss, shape (2, 3).
+    title
+        What stands under the picture.
+    """
+
+    u: FloatArray
+    centres: FloatArray
+    ends: FloatArray
+    lines: FloatArray
+    title: str
+
+
+def shift(result: CompassResult) -> Shift:
+    """Centres and line of one compass; PAPER.md Fig. 4, seen along each axis."""
+    fit = result.fit
+    scale = 1.0 if fit.regressor == CURRENT else 100.0
+    rest = fit.correction.centre(0.0)
+    u = np.array([level.u for level in fit.levels])
+    moved = [fit.correction.soft_iron @ (level.centre - rest) for level in fit.levels]
+    ends = np.array([0.0, max(fit.u_high, float(u.max(initial=0.0)))])
+    return Shift(
+        u=scale * u,
+        centres=np.array(moved).reshape(-1, 3),
+        ends=scale * ends,
+        lines=np.outer(ends, fit.interference),
+        title="current, A" if fit.regressor == CURRENT else "throttle, %",
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Unexplained:
+    """Field that is left unexplained, in time.
+
+    Attributes
+    ----------
+    time
+        Seconds, shape (n,).
+    before, after
+        mGauss, shape (n,).
+    """
+
+    time: FloatArray
+    before: FloatArray
+    after: FloatArray
+
+
+_DRAWN = 240
+
+
+def unexplained(plots: CompassPlots) -> Unexplained:
+    """Lengths of the residuals, thinned to what a terminal can show: the median of each stretch."""
+    count = len(plots.time)
+    edges = np.unique(np.linspace(0, count, min(count, _DRAWN) + 1).astype(int))
+
+    def medians(values: FloatArray) -> FloatArray:
+        rows = itertools.pairwise(edges)
+        return np.array([np.median(values[first:last]) for first, last in rows])
+
+    return Unexplained(
+        time=medians(plots.time),
+        before=medians(np.linalg.norm(plots.before, axis=1)),
+        after=medians(np.linalg.norm(plots.after, axis=1)),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class CompassPicture:
+    """Everything the fit screen shows of one compass."""
+
+    result: CompassResult
+    errors: tuple[ErrorRow, ...]
+    shift: Shift
+    unexplained: Unexplained
+
+
+def picture(result: CompassResult, plots: CompassPlots) -> CompassPicture:
+    """Make the pictures of one compass; runs beside the fit, off the screen's thread."""
+    return CompassPicture(result, error_rows(result), shift(result), unexplained(plots))
+
+
+def round_ticks(low: float, high: float, most: int) -> list[float]:
+    """At most ``most`` numbers from ``low`` to ``high``, steps of 1, 2 or 5 times a power of 10."""
+    span = high - low
+    if span <= 0.0 or not np.isfinite(span):
+        return [low]
+    power = 10.0 ** np.floor(np.log10(span / most))
+    steps = (power * factor for factor in (1.0, 2.0, 5.0, 10.0, 20.0))
+    step = next(each for each in steps if span / each <= most - 1 or each >= 20.0 * power)
+    first = np.ceil(low / step - 1e-9)
+    ticks = step * np.arange(first, np.floor(high / step + 1e-9) + 1)
+    return [float(tick) + 0.0 for tick in ticks]  # adding 0 turns −0 into 0

@@ -1,0 +1,1 @@
+"""The five steps and the dialogs between them, a file each."""

@@ -1,0 +1,184 @@
+"""Connect: choose a vehicle or a log, and see what it is and what will stand in the way."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import ClassVar
+
+from textual.binding import Binding, BindingType
+from textual.containers import Horizontal, Vertical, VerticalScroll
+from textual.content import Content
+from textual.widget import Widget
+from textual.widgets import Input, OptionList, Static
+from textual.widgets.option_list import Option
+
+from magcomp.report import words
+from magcomp.tui import opening
+from magcomp.tui.choices import SIMULATED, Choice
+from magcomp.tui.screens.step import StepScreen
+from magcomp.tui.vehicle_card import VehicleCard
+
+_TARGET_CELLS = 36
+
+
+class TargetList(OptionList):
+    """What can be connected to or opened."""
+
+    HELP = """\
+**Where is the vehicle?** Choose with the arrow keys and press Enter.
+
+- A *serial port* is a USB cable or a telemetry radio (add the baud rate of a radio by typing
+  `/dev/ttyUSB0,57600` below).
+- *udp:0.0.0.0:14550* listens for a vehicle, simulator or ground station that sends to this
+  computer; *tcp:HOST:PORT* connects to one.
+- A *log* is a .tlog, .BIN or .ulg file: everything but writing works without a vehicle.
+- The *simulated vehicle* needs nothing and can break nothing.
+"""
+
+
+class AddressInput(Input):
+    """An address or a path, typed."""
+
+    HELP = """\
+**Address or log.** Type where the vehicle is, or the path of a log, and press Enter:
+
+    udp:0.0.0.0:14550        tcp:127.0.0.1:5760
+    /dev/ttyACM0             /dev/ttyUSB0,57600
+    COM7,57600               flights/flight.tlog
+"""
+
+
+class CardView(VerticalScroll):
+    """The vehicle in words, with warnings."""
+
+    HELP = """\
+**The vehicle**: what it is, what calibration it has now, and what will stand in the way of a good
+result. Nothing has been written or changed yet.
+"""
+
+    def compose(self) -> Iterator[Widget]:
+        """One text in a scroll."""
+        yield Static(id="card-text")
+
+    def show(self, card: VehicleCard | None) -> None:
+        """Draw a card."""
+        self.query_one("#card-text", Static).update(card_text(card))
+
+
+def card_text(card: VehicleCard | None) -> Content:
+    """A card as text."""
+    if card is None:
+        return Content.styled("Nothing is connected or open yet.", "$quiet")
+    lines = [Content.styled(card.title, "bold"), Content("")]
+    width = max((len(name) for name, _ in card.facts), default=0) + 2
+    for name, fact in card.facts:
+        lines.append(Content.assemble((f"{name:<{width}}", "$quiet"), fact))
+    lines.append(Content(""))
+    for warning in card.warnings:
+        lines.append(Content.assemble(("Mind: ", "bold $warning"), warning))
+    if not card.warnings:
+        lines.append(Content.assemble(("● ", "$success"), "Nothing stands in the way."))
+    return Content("\n").join(lines)
+
+
+def choice_text(choice: Choice, *, roomy: bool) -> Content:
+    """A line of the list, or two where there is room; of a long path the end counts."""
+    target = choice.target
+    if len(target) > _TARGET_CELLS:
+        target = f"…{target[1 - _TARGET_CELLS :]}"
+    if roomy:
+        return Content.assemble((target, "bold"), "\n", (choice.note, "$quiet"))
+    return Content.assemble(f"{target:<{_TARGET_CELLS}}  ", (choice.note, "$quiet"))
+
+
+class ConnectScreen(StepScreen):
+    """The first step."""
+
+    STEP = "connect"
+    HELP = TargetList.HELP
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("o", "app.open_log", "Open log", id="connect.open"),
+        Binding("s", "app.simulate", "Simulated", id="connect.simulate"),
+        Binding("a", "address", "Address", id="connect.address"),
+        Binding("r", "ports", "Rescan", id="connect.rescan"),
+        Binding("x", "app.disconnect", "Disconnect", id="connect.close"),
+        Binding("n", "app.forward", "Next step", id="go.next"),
+    ]
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._choices: tuple[Choice, ...] = ()
+
+    def body(self) -> Iterable[Widget]:
+        """List and address on the left, the vehicle on the right."""
+        with Horizontal(classes="body"):
+            with Vertical(id="targets"):
+                yield TargetList(id="choices")
+                yield AddressInput(
+                    placeholder="or type an address or the path of a log", id="address"
+                )
+            yield CardView(id="card")
+
+    def on_mount(self) -> None:
+        """Look for serial ports."""
+        self.query_one("#choices").border_title = "Where is the vehicle?"
+        self.query_one("#card").border_title = "Vehicle"
+        self.query_one(TargetList).focus()
+        opening.scan_ports(self.magcomp)
+
+    def _fill(self, choices: tuple[Choice, ...]) -> None:
+        if choices == self._choices:
+            return
+        self._choices = choices
+        listing = self.query_one(TargetList)
+        kept = listing.highlighted or 0
+        listing.clear_options()
+        roomy = self.has_class("-tall")
+        for choice in choices:
+            listing.add_option(Option(choice_text(choice, roomy=roomy), id=choice.target))
+        if choices:
+            listing.highlighted = min(kept, len(choices) - 1)
+
+    def draw(self) -> None:
+        """Draw the vehicle and what to do next."""
+        work, busy, live = self.magcomp.work, self.magcomp.busy, self.magcomp.live
+        self._fill(self.magcomp.choices)
+        self.query_one(CardView).show(work.card)
+        if self.has_class("-known") != (work.card is not None):
+            self.set_class(work.card is not None, "-known")
+            self.query_one("#choices" if work.card is None else "#card").focus()
+        if busy is not None:
+            self.say(busy.sentence)
+        elif live is not None and work.card is None:
+            self.say(f"Wait: {live.guidance.text}. X gives up. {words.sentence(live.link_text)}")
+        elif work.card is None:
+            self.say("Choose with the arrow keys and press Enter, or press A and type an address.")
+        elif work.live:
+            self.say("Press N to record. X disconnects.")
+        else:
+            self.say("Press N to see the fit of this log. X closes it.")
+
+    def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
+        """Connect to a line of the list."""
+        target = event.option_id or ""
+        if target == SIMULATED:
+            opening.simulate(self.magcomp)
+        elif target:
+            opening.open_target(self.magcomp, target)
+
+    def on_input_submitted(self, event: Input.Submitted) -> None:
+        """Connect to what was typed."""
+        if event.value.strip():
+            opening.open_target(self.magcomp, event.value.strip())
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:  # noqa: ARG002
+        """Hide what is done with."""
+        return action not in ("address", "ports") or not self.magcomp.work.source
+
+    def action_address(self) -> None:
+        """Type an address."""
+        self.query_one(AddressInput).focus()
+
+    def action_ports(self) -> None:
+        """Look for serial ports again."""
+        opening.scan_ports(self.magcomp)

@@ -1,0 +1,232 @@
+"""Fit: the answer for each compass in pictures and words, and another try at once."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import ClassVar, TypeVar
+
+from textual.binding import Binding, BindingType
+from textual.containers import Container, VerticalScroll
+from textual.content import Content
+from textual.widget import Widget
+from textual.widgets import ProgressBar, Static
+
+from magcomp.fit import METHODS
+from magcomp.model import Analysis, Grade
+from magcomp.report import words
+from magcomp.session import Options
+from magcomp.tui import fitting
+from magcomp.tui.pictures import AXES, AXIS_WORDS, CompassPicture
+from magcomp.tui.screens.step import StepScreen
+from magcomp.tui.widgets.heading_table import HeadingTable
+from magcomp.tui.widgets.plots import ShiftPlot, UnexplainedPlot
+from magcomp.tui.widgets.verdict_text import VerdictText, grade_word
+
+VIEWS = {
+    "heading": "Heading error",
+    "shift": "What the motors add",
+    "unexplained": "Unexplained field, mGauss",
+    "verdict": "Verdict",
+}
+_OPTION_KEYS = ("fit.method", "fit.regressor", "fit.compasses", "fit.time")
+
+_T = TypeVar("_T")
+
+REGRESSORS = ("auto", "current", "throttle")
+
+
+class FitScreen(StepScreen):
+    """The third step."""
+
+    STEP = "fit"
+    HELP = """\
+**The fit.** How far the motors push each compass, and what the correction leaves.
+
+One picture at a time on a small screen: V shows the next. 1, 2 and 3 choose the compass. M, R, T
+and C change method, regressor, time range and compasses, and fit again at once.
+"""
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("1", "compass(1)", "Compass", id="compass.1", key_display="1-3"),
+        Binding("2", "compass(2)", "Compass 2", id="compass.2", show=False),
+        Binding("3", "compass(3)", "Compass 3", id="compass.3", show=False),
+        Binding("v", "view", "View", id="fit.view"),
+        # These four are named where their values stand.
+        Binding("m", "method", "Other method", id="fit.method", show=False),
+        Binding("r", "regressor", "Other regressor", id="fit.regressor", show=False),
+        Binding("c", "compasses", "Fit all compasses, or one", id="fit.compasses", show=False),
+        Binding("t", "time", "Other time range", id="fit.time", show=False),
+        Binding("f", "app.fit", "Fit again", id="fit.again"),
+        Binding("b", "app.backward", "Back", id="go.back"),
+        Binding("n", "app.forward", "Write", id="go.next"),
+    ]
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._compass = 0
+        self._view = "heading"
+        self._drawn: tuple[CompassPicture, Analysis] | None = None
+
+    def body(self) -> Iterable[Widget]:
+        """Grades, options, progress, and the four views."""
+        yield Static(id="grades")
+        yield Static(id="options")
+        yield ProgressBar(total=1.0, show_eta=False, id="progress")
+        with Container(id="views"):
+            with VerticalScroll(id="view-heading", classes="view"):
+                yield HeadingTable(id="headings")
+            with Container(id="view-shift", classes="view"):
+                yield ShiftPlot(id="shift")
+            with Container(id="view-unexplained", classes="view"):
+                yield UnexplainedPlot(id="unexplained")
+            with Container(id="view-verdict", classes="view"):
+                yield VerdictText(id="verdict")
+        yield Static(id="nothing", classes="nothing")
+
+    def on_mount(self) -> None:
+        """Name the views."""
+        for name, title in VIEWS.items():
+            self.query_one(f"#view-{name}").border_title = title
+        self._show_view()
+
+    def draw(self) -> None:
+        """Draw the answer, the options, and how far a new fit is."""
+        work, busy = self.magcomp.work, self.magcomp.busy
+        bar = self.query_one(ProgressBar)
+        bar.display = busy is not None
+        if busy is not None:
+            bar.update(progress=busy.share)
+        analysis = work.analysis
+        self.set_class(analysis is None, "-nothing")
+        self.query_one("#options", Static).update(
+            options_line(work.options, analysis, [self._key(name) for name in _OPTION_KEYS])
+        )
+        if analysis is None:
+            self._drawn = None
+            self.query_one("#grades", Static).update("")
+            self.query_one("#nothing", Static).update("" if busy else "Nothing is fitted yet.")
+        else:
+            self._draw_compass(analysis)
+        self.say(busy.sentence if busy is not None else self._next(analysis))
+
+    def _draw_compass(self, analysis: Analysis) -> None:
+        pictures = self.magcomp.work.pictures
+        if self._compass not in pictures:
+            self._compass = min(pictures)
+        shown = pictures[self._compass]
+        self.query_one("#grades", Static).update(grades_line(analysis, self._compass))
+        if self._drawn == (shown, analysis):
+            return
+        self._drawn = (shown, analysis)
+        self.query_one(HeadingTable).show(shown.errors)
+        self.query_one(ShiftPlot).show(shown.shift)
+        self.query_one(UnexplainedPlot).show(shown.unexplained)
+        self.query_one(VerdictText).show(shown.result, analysis.notes)
+        residual = shown.result.verdict.residual
+        self.query_one("#view-unexplained").border_title = (
+            f"{VIEWS['unexplained']}: {residual.held_out_before:.1f} → {residual.after:.1f}, "
+            f"unseen {residual.held_out:.1f}"
+        )
+        self.query_one("#view-unexplained").border_subtitle = "x now   • corrected"
+        axes = zip(AXES, AXIS_WORDS, shown.result.fit.interference, strict=True)
+        self.query_one("#view-shift").border_subtitle = "   ".join(
+            f"{axis} {name} {words.number(float(value))}" for axis, name, value in axes
+        )
+        title = words.interference_title(shown.result.fit.regressor)
+        self.query_one("#view-shift").border_title = f"{title[:1].upper()}{title[1:]}"
+
+    def _key(self, name: str) -> str:
+        """The key of an action as it is displayed; the settings may have changed it."""
+        bound = (each.binding for each in self.active_bindings.values())
+        found = next((binding for binding in bound if binding.id == name), None)
+        return "" if found is None else self.app.get_key_display(found).upper()
+
+    def _next(self, analysis: Analysis | None) -> str:
+        if analysis is None:
+            return "Press F to fit what was recorded."
+        if analysis.grade is Grade.REJECTED:
+            return "Nothing to write: do what the verdict says, record again, and fit again."
+        return "Look at the pictures (V), then press N to see what would be written."
+
+    def _show_view(self) -> None:
+        for name in VIEWS:
+            self.query_one(f"#view-{name}").set_class(name == self._view, "-shown")
+
+    # ---------------------------------------------------------------- keys
+
+    def action_compass(self, compass: int) -> None:
+        """Show one compass."""
+        if compass in self.magcomp.work.pictures:
+            self._compass = compass
+            self.redraw()
+        elif self.magcomp.work.analysis is not None:
+            self.notify(f"Compass {compass} is not in this fit. C chooses what is fitted.")
+
+    def action_view(self) -> None:
+        """Show the next view."""
+        names = list(VIEWS)
+        self._view = names[(names.index(self._view) + 1) % len(names)]
+        self._show_view()
+
+    def action_method(self) -> None:
+        """Fit with the next method."""
+        fitting.change(self.magcomp, method=_after(METHODS, self.magcomp.work.options.method))
+
+    def action_regressor(self) -> None:
+        """Fit against the next control quantity."""
+        fitting.change(
+            self.magcomp, regressor=_after(REGRESSORS, self.magcomp.work.options.regressor)
+        )
+
+    def action_compasses(self) -> None:
+        """Fit all compasses, or one."""
+        recording = self.magcomp.work.recording
+        every = (None, *sorted(recording.field)) if recording is not None else (None,)
+        fitting.change(self.magcomp, compass=_after(every, self.magcomp.work.options.compass))
+
+    def action_time(self) -> None:
+        """Ask for another time range."""
+        fitting.ask_time_range(self.magcomp)
+
+
+def options_line(options: Options, analysis: Analysis | None, keys: Sequence[str]) -> Content:
+    """What is fitted and how, each with its key; what ``auto`` chose after an arrow."""
+    fit = analysis.compasses[0].fit if analysis is not None else None
+    parts = (
+        ("method", _chosen(options.method, fit.method if fit else "")),
+        ("by", _chosen(options.regressor, fit.regressor if fit else "")),
+        ("compass", "all" if options.compass is None else str(options.compass)),
+        ("time", time_range(options)),
+    )
+    texts = [
+        Content.assemble((f" {key}", "bold $accent"), (f" {name} ", "$quiet"), value)
+        for key, (name, value) in zip(keys, parts, strict=True)
+    ]
+    return Content(" ").join(texts)
+
+
+def time_range(options: Options) -> str:
+    """``whole``, or ``20 … 60 s``."""
+    start, end = max(options.start, 0.0), options.end
+    if math.isinf(end):
+        return "whole" if start == 0.0 else f"from {start:g} s"
+    return f"{start:g} … {end:g} s"
+
+
+def grades_line(analysis: Analysis, shown: int) -> Content:
+    """The grade of each compass; the one shown is in brackets and reversed."""
+    parts = []
+    for result in analysis.compasses:
+        number = result.fit.compass
+        here = number == shown
+        name = Content.styled(f"[{number}]" if here else f" {number} ", "reverse" if here else "")
+        parts.append(Content.assemble(" ", name, " ", grade_word(result.verdict.grade)))
+    return Content.assemble(Content.styled(" Compass", "$quiet"), *parts)
+
+
+def _chosen(asked: str, used: str) -> str:
+    return f"{asked} → {used}" if asked == "auto" and used else asked
+
+
+def _after(values: tuple[_T, ...], value: _T) -> _T:
+    return values[(values.index(value) + 1) % len(values)] if value in values else values[0]

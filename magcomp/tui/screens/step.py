@@ -1,0 +1,74 @@
+"""What the five screens of the road have in common: frame, keys, and how they are drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, ClassVar, cast
+
+from textual.app import ComposeResult
+from textual.screen import Screen
+from textual.widget import Widget
+from textual.widgets import Footer
+
+from magcomp.tui.widgets.next_line import NextLine
+from magcomp.tui.widgets.top_bar import TopBar
+
+if TYPE_CHECKING:
+    from magcomp.tui.app import MagcompApp
+
+
+class StepScreen(Screen[None]):
+    """A step of the road.
+
+    A subclass names its ``STEP``, gives its ``body`` and draws what it is given in ``draw``.
+    Nothing is drawn while another step is on the screen.
+    """
+
+    STEP: ClassVar[str]
+    HELP: ClassVar[str | None] = None
+    HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (110, "-wide")]  # noqa: RUF012 - as in Screen
+    VERTICAL_BREAKPOINTS = [(0, "-short"), (32, "-tall")]  # noqa: RUF012
+    AUTO_FOCUS = None
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._bindings_drawn: object = None
+
+    def compose(self) -> ComposeResult:
+        """Frame and body."""
+        yield TopBar(self.STEP)
+        yield from self.body()
+        yield NextLine()
+        yield Footer(show_command_palette=False)
+
+    def body(self) -> Iterable[Widget]:
+        """What stands between the top bar and the next line."""
+        raise NotImplementedError
+
+    def draw(self) -> None:
+        """Draw the app's work as it is now."""
+        raise NotImplementedError
+
+    @property
+    def magcomp(self) -> MagcompApp:
+        """The app, with its own type."""
+        return cast("MagcompApp", self.app)
+
+    def say(self, sentence: str) -> None:
+        """Show what to do next."""
+        self.query_one(NextLine).say(sentence)
+
+    def redraw(self) -> None:
+        """Draw, if this screen is there to be drawn on."""
+        if self.is_mounted and self.is_attached:
+            self.query_one(TopBar).show(self.magcomp.steps_done, self.magcomp.status)
+            self.draw()
+            # The footer is built anew with the bindings: only where they may differ.
+            bindings = self.magcomp.binding_state
+            if bindings != self._bindings_drawn:
+                self._bindings_drawn = bindings
+                self.refresh_bindings()
+
+    def on_screen_resume(self) -> None:
+        """Draw what changed meanwhile."""
+        self.call_after_refresh(self.redraw)

@@ -1,0 +1,114 @@
+"""Verify: headings before and after the correction side by side, while the throttle changes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import ClassVar
+
+from textual.binding import Binding, BindingType
+from textual.containers import Container, Vertical
+from textual.content import Content
+from textual.widget import Widget
+from textual.widgets import Static
+
+from magcomp.session.guide import Situation
+from magcomp.tui.before_after import HeadingPair, HeadingWatch, heading_pairs
+from magcomp.tui.screens.step import StepScreen
+from magcomp.tui.widgets.heading_pairs import HeadingPairs, HeadingPlot
+from magcomp.tui.widgets.live_table import ControlBars
+
+_PLOT_EVERY_S = 0.5
+
+
+class VerifyScreen(StepScreen):
+    """The fifth step."""
+
+    STEP = "verify"
+    HELP = HeadingPairs.HELP
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("1", "compass(1)", "Plot", id="compass.1", key_display="1-3"),
+        Binding("2", "compass(2)", "Compass 2", id="compass.2", show=False),
+        Binding("3", "compass(3)", "Compass 3", id="compass.3", show=False),
+        Binding("m", "mark", "Mark heading", id="verify.mark"),
+        Binding("u", "app.undo", "Undo writing", id="review.undo"),
+        Binding("b", "app.backward", "Back", id="go.back"),
+        Binding("x", "app.disconnect", "Disconnect", id="connect.close"),
+    ]
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._watch = HeadingWatch()
+        self._pairs: tuple[HeadingPair, ...] = ()
+        self._said = ""
+        self._compass = 1
+        self._plotted_at = -_PLOT_EVERY_S
+
+    def body(self) -> Iterable[Widget]:
+        """Motors above, headings below."""
+        with Vertical(classes="body"):
+            with Container(id="controls", classes="panel"):
+                yield ControlBars(id="control")
+            with Container(id="pairs", classes="panel"):
+                yield HeadingPairs(id="headings")
+            with Container(id="trace", classes="panel"):
+                yield HeadingPlot(id="trace-plot")
+            yield Static(id="held-now")
+
+    def on_mount(self) -> None:
+        """Name the panels."""
+        self.query_one("#controls").border_title = "Motors"
+        self.query_one("#pairs").border_title = "Heading before and after the correction"
+        self._name_plot()
+
+    def draw(self) -> None:
+        """Draw the newest headings."""
+        app = self.magcomp
+        if app.live is None:
+            self.say("Connect to a vehicle first.")
+            return
+        now = app.live.elapsed_s
+        self._pairs = self._watch.look(heading_pairs(app.live, app.work, app.writing), now)
+        self.query_one(ControlBars).show(app.live)
+        self.query_one(HeadingPairs).show(self._pairs, marked=self._watch.marked)
+        if abs(now - self._plotted_at) >= _PLOT_EVERY_S and self.has_class("-tall"):
+            self._plotted_at = now
+            self.query_one(HeadingPlot).show(self._watch.trace(self._compass))
+        self._show_state()
+        self.say(app.busy.sentence if app.busy is not None else self._next())
+
+    def _show_state(self) -> None:
+        app = self.magcomp
+        if app.writing.in_force:
+            said = "The new parameters are in force; “before” is worked out from the backup."
+        elif app.work.analysis is not None:
+            said = "Nothing is written yet; “corrected” is worked out from the fit."
+        else:
+            said = "Nothing is fitted yet, so there is nothing to compare."
+        if said != self._said:
+            self._said = said
+            self.query_one("#held-now", Static).update(Content(f" {said}"))
+
+    def _next(self) -> str:
+        live = self.magcomp.live
+        if live is not None and not live.connected:
+            return "The link is lost: this screen goes on by itself when it is back."
+        if live is not None and live.situation is Situation.FLYING:
+            return "Hold a heading, climb and descend: “takes out” grows with the throttle."
+        if not self._watch.marked:
+            return "Hold the vehicle still, press M, then raise the throttle and watch “moved”."
+        return "Change the throttle: “before” moves, “corrected” stays. Q ends."
+
+    def action_compass(self, compass: int) -> None:
+        """Plot another compass."""
+        self._compass = compass
+        self._name_plot()
+
+    def _name_plot(self) -> None:
+        plot = self.query_one("#trace")
+        plot.border_title = f"Compass {self._compass}: heading moved since the mark, °"
+        plot.border_subtitle = "x before   • corrected"
+
+    def action_mark(self) -> None:
+        """Measure from the headings as they are."""
+        self._watch.mark(self._pairs)
+        self.redraw()

@@ -1,0 +1,206 @@
+"""Everything the screens need from outside, in one place that a test can replace."""
+
+from __future__ import annotations
+
+import queue
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import datetime
+from pathlib import Path
+from typing import Protocol
+
+from magcomp.errors import LinkError, MagcompError
+from magcomp.link import SerialPort, serial_ports
+from magcomp.log import read
+from magcomp.model import Analysis, ParameterSet, Recording, Vehicle, Verdict
+from magcomp.parameters.events import Event, Outcome
+from magcomp.parameters.plan import WritePlan
+from magcomp.report.evidence import compass_plots
+from magcomp.session import Options, analyse, check
+from magcomp.session.live import LiveSession
+from magcomp.session.snapshot import LiveSnapshot
+from magcomp.session.upload import new_file
+from magcomp.simulate import Vehicle as SimulatedVehicle
+from magcomp.simulate import scenario, serve
+from magcomp.tui.pictures import CompassPicture, picture
+
+Progress = Callable[[str, float], None]
+"""What is being done, and the share done, 0 … 1."""
+
+_SERVE_S = 10.0
+
+
+class Session(Protocol):
+    """What the screens need of a live vehicle; `LiveSession` has it."""
+
+    def snapshot(self) -> LiveSnapshot:
+        """Everything a screen shows, now; cheap."""
+        ...
+
+    def recording(self) -> Recording:
+        """All that has been received so far."""
+        ...
+
+    def upload_plan(self, wanted: ParameterSet) -> WritePlan:
+        """Read the vehicle's calibration and compare."""
+        ...
+
+    def upload(
+        self,
+        plan: WritePlan,
+        backup_path: Path,
+        on_event: Callable[[Event], None],
+    ) -> Outcome:
+        """Write and verify, or put everything back."""
+        ...
+
+    def restore_plan(self, backup: Path) -> WritePlan:
+        """Compare the vehicle with a backup."""
+        ...
+
+    def restore(
+        self,
+        backup: Path,
+        plan: WritePlan,
+        backup_path: Path,
+        on_event: Callable[[Event], None],
+    ) -> Outcome:
+        """Write what `restore_plan` made."""
+        ...
+
+    def close(self) -> None:
+        """Give link and file back."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Simulation:
+    """A simulated vehicle that is running.
+
+    Attributes
+    ----------
+    address
+        How to reach it.
+    stop
+        Ends it.
+    """
+
+    address: str
+    stop: Callable[[], None]
+
+
+def open_live(address: str, record: Path, system: int | None) -> Session:
+    """Open a vehicle's address and record what comes; see `LiveSession.open`."""
+    return LiveSession.open(address, record=record, system=system)
+
+
+def simulate() -> Simulation:
+    """Start a simulated vehicle on this computer.
+
+    Raises
+    ------
+    LinkError
+        It could not be started.
+    """
+    stop = threading.Event()
+    ready: queue.Queue[str | Exception] = queue.Queue()
+
+    def live() -> None:
+        try:
+            vehicle = SimulatedVehicle(scenario("flight", seed=7), wait_for_ground=True)
+            serve("udp:127.0.0.1:0", vehicle, announce=ready.put, stop=stop)
+        except MagcompError as error:
+            ready.put(error)
+
+    thread = threading.Thread(target=live, name="magcomp-simulated", daemon=True)
+    thread.start()
+    try:
+        answer = ready.get(timeout=_SERVE_S)
+    except queue.Empty as error:
+        raise LinkError("The simulated vehicle must start; instead nothing happened") from error
+    if isinstance(answer, Exception):
+        raise answer
+
+    def end() -> None:
+        stop.set()
+        thread.join()
+
+    return Simulation(answer, end)
+
+
+def _now() -> datetime:
+    return datetime.now().astimezone()
+
+
+def _read(path: Path, system: int | None) -> Recording:
+    return read(path, system=system)
+
+
+@dataclass(frozen=True)
+class Services:
+    """What the app calls, off its own thread.
+
+    Attributes
+    ----------
+    ports
+        The serial ports and what is plugged in.
+    read
+        A log's recording; of one MAVLink system where several are in it.
+    open_live
+        A session with the vehicle at an address, that records into a file.
+    simulate
+        Starts a simulated vehicle.
+    now
+        The time, for names of files.
+    folder
+        Where recordings and backups go; None for the platform's place.
+    """
+
+    ports: Callable[[], Sequence[SerialPort]] = serial_ports
+    read: Callable[[Path, int | None], Recording] = _read
+    open_live: Callable[[str, Path, int | None], Session] = open_live
+    simulate: Callable[[], Simulation] = simulate
+    now: Callable[[], datetime] = _now
+    folder: Path | None = field(default=None)
+
+    def new_file(self, kind: str, suffix: str, vehicle: Vehicle | None) -> Path:
+        """A file that does not exist yet, named after vehicle and time.
+
+        Raises
+        ------
+        OutputError
+            No file can be made there.
+        """
+        path = new_file(kind, suffix, vehicle, self.now().timestamp())
+        return path if self.folder is None else self.folder / path.name
+
+
+def judge_present(recording: Recording) -> Mapping[int, Verdict]:
+    """The judge's word on the calibration in force; nothing where a recording lacks something.
+
+    A recording that cannot be judged can still be shown, and the fit will say what is missing.
+    """
+    try:
+        return check(recording)
+    except MagcompError:
+        return {}
+
+
+def fit(
+    recording: Recording, options: Options, progress: Progress
+) -> tuple[Analysis, Mapping[int, CompassPicture]]:
+    """Fit a recording and make its pictures.
+
+    Raises
+    ------
+    MagcompError
+        As :func:`magcomp.session.analyse`.
+    """
+    analysis = analyse(recording, options, progress)
+    pictures = {}
+    for result in analysis.compasses:
+        progress(f"drawing compass {result.fit.compass}", 1.0)
+        plots = compass_plots(recording, result, start=options.start, end=options.end)
+        pictures[result.fit.compass] = picture(result, plots)
+    return analysis, pictures

@@ -1,0 +1,66 @@
+"""Where the pilot stands on the road: which steps there are, which are done, what is missing."""
+
+from __future__ import annotations
+
+from magcomp.model import Grade
+from magcomp.report import words
+from magcomp.session.snapshot import LiveSnapshot
+from magcomp.tui.widgets.top_bar import STEPS, Status
+from magcomp.tui.work import Work
+
+
+def road(work: Work) -> tuple[str, ...]:
+    """Steps for what is in hand; a log has nothing to record and nothing to verify."""
+    return tuple(STEPS) if work.live or not work.source else ("connect", "fit", "review")
+
+
+def missing(step: str, work: Work) -> str:
+    """Why a step cannot be taken yet; empty where it can."""
+    if step == "connect":
+        return ""
+    if not work.source:
+        return "Connect to a vehicle or open a log first."
+    if step not in road(work):
+        return f"{STEPS[step]} needs a vehicle; this is a log."
+    if step == "fit" and work.live and work.card is None:
+        return "Wait until the vehicle's calibration is read."
+    if step == "review" and work.analysis is None:
+        return "Fit first: there is nothing to write yet."
+    return ""
+
+
+def steps_done(work: Work, live: LiveSnapshot | None) -> frozenset[str]:
+    """Steps that need no more work."""
+    enough = live is not None and live.guidance.enough
+    found = {
+        "connect": work.card is not None,
+        "record": enough or (work.live and work.analysis is not None),
+        "fit": work.analysis is not None and work.analysis.grade is not Grade.REJECTED,
+        "review": bool(work.kept),
+    }
+    return frozenset(step for step, done in found.items() if done)
+
+
+def status(work: Work, live: LiveSnapshot | None) -> Status:
+    """What is connected, and how well."""
+    if live is None:
+        if not work.source:
+            return Status("no vehicle, no log")
+        length = "" if work.recording is None else words.duration(work.recording.duration_s)
+        return Status(f"log {work.name}", length)
+    name = work.name if live.vehicle is None else words.vehicle(live.vehicle)
+    if live.vehicle is None:
+        return Status(f"{work.name}: looking for a vehicle", "")
+    if not live.connected:
+        return Status(name, "LINK LOST: trying again", alarm=True)
+    state = {True: "ARMED", False: "disarmed", None: ""}[live.armed]
+    return Status(name, f"{state}  link good, {100 * live.link.loss:.0f} % lost".strip())
+
+
+def quit_question(work: Work, busy: bool) -> str:
+    """What would be lost by quitting; empty where nothing."""
+    if busy:
+        return "Something is being done at the moment. Quit all the same?"
+    if work.unwritten:
+        return "The results are not written anywhere yet. Quit all the same?"
+    return ""

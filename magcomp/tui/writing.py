@@ -1,0 +1,258 @@
+"""Writing: which compasses, a file, the vehicle with confirmation and progress, and undoing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from magcomp.errors import MagcompError
+from magcomp.model import Grade
+from magcomp.parameters.events import Event, Outcome
+from magcomp.parameters.files import SUFFIXES, format_value, write_parameter_file
+from magcomp.parameters.plan import WritePlan
+from magcomp.parameters.writer import raise_for_failure
+from magcomp.report import words
+from magcomp.tui.changes import ChangeRow, after_event, change_rows, left_out_warnings
+from magcomp.tui.screens.dialogs import AskText, Confirm, Message
+from magcomp.tui.services import Progress
+from magcomp.tui.work import Work, Writing
+
+if TYPE_CHECKING:
+    from magcomp.tui.app import MagcompApp
+
+
+def prepare(app: MagcompApp) -> None:
+    """Work out what would change, for what is chosen now."""
+    work = app.work
+    if work.analysis is None:
+        app.writing = Writing()
+        return
+    app.writing = Writing(
+        rows=change_rows(work.present, work.parameters),
+        warnings=tuple(left_out_warnings(work.analysis, work.chosen, work.present)),
+        backup=_backup(app) if work.live else None,
+    )
+    app.redraw()
+
+
+def choose(app: MagcompApp, compass: int) -> None:
+    """Write a compass, or leave it out."""
+    work = app.work
+    results = {} if work.analysis is None else {c.fit.compass: c for c in work.analysis.compasses}
+    if app.busy is not None or compass not in results:
+        return
+    if results[compass].verdict.grade is Grade.REJECTED:
+        app.notify(f"Compass {compass} is rejected: its fit is not written.", severity="warning")
+        return
+    app.set_work(replace(work, chosen=work.chosen ^ {compass}, kept=""))
+    prepare(app)
+
+
+# ------------------------------------------------------------------------ a file
+
+
+def ask_save(app: MagcompApp) -> None:
+    """Ask where to, and save the parameters of the chosen compasses."""
+    if app.work.parameters is None:
+        app.notify("There is nothing to save: no compass is chosen.", severity="warning")
+        return
+    dialog = AskText(
+        "Save a parameter file",
+        f"Its end chooses its form: {words.listed(SUFFIXES)}.",
+        (("File", str(_proposed(app.work))),),
+    )
+    app.push_screen(dialog, lambda answer: _save(app, answer[0]) if answer else None)
+
+
+def _proposed(work: Work) -> Path:
+    return Path("compass.param") if work.live else Path(work.source).with_suffix(".param")
+
+
+def _save(app: MagcompApp, text: str) -> None:
+    path = Path(text).expanduser()
+    if path.is_file():
+        question = f"{path} exists already. Overwrite it?"
+        dialog = Confirm("Overwrite?", question, yes="Overwrite", no="Keep")
+        app.push_screen(dialog, lambda sure: _save_now(app, path, force=True) if sure else None)
+    else:
+        _save_now(app, path, force=False)
+
+
+def _save_now(app: MagcompApp, path: Path, *, force: bool) -> None:
+    parameters = app.work.parameters
+    if parameters is None:
+        return
+    try:
+        write_parameter_file(path, parameters, force=force)
+    except MagcompError as error:
+        app.complain(error)
+        return
+    app.set_work(replace(app.work, kept=str(path)))
+    app.writing = replace(app.writing, result=f"saved to {path}")
+    app.redraw()
+
+
+# ------------------------------------------------------------------------ the vehicle
+
+
+def ask_write(app: MagcompApp) -> None:
+    """Read what the vehicle holds, show what would happen, and ask."""
+    session, wanted = app.session, app.work.parameters
+    if session is None:
+        app.notify("This is a log: connect to the vehicle to write to it, or press S to save.")
+    elif wanted is None:
+        app.notify("There is nothing to write: no compass is chosen.", severity="warning")
+    elif _may_write(app):
+        app.run_task(
+            "reading what the vehicle holds",
+            lambda _: session.upload_plan(wanted),
+            lambda plan: _confirm(app, plan),
+        )
+
+
+def _may_write(app: MagcompApp) -> bool:
+    live = app.live
+    if live is not None and not live.connected:
+        message = Message(
+            "Not now", "The link to the vehicle is lost.", "Wait until it is back, then press W."
+        )
+    elif live is not None and live.armed:
+        message = Message("Not now", "The vehicle is armed.", "Land and disarm it, then press W.")
+    else:
+        return True
+    app.push_screen(message)
+    return False
+
+
+def _confirm(app: MagcompApp, plan: WritePlan) -> None:
+    rows = tuple(
+        ChangeRow(change.name, format_value(change.old), format_value(change.new))
+        for change in plan.changes
+    )
+    backup = _backup(app)
+    app.writing = replace(
+        app.writing, rows=rows, backup=backup, warnings=(*app.writing.warnings, *plan.warnings)
+    )
+    app.redraw()
+    if not rows or backup is None:
+        app.notify("The vehicle holds these values already: nothing is to be written.")
+        return
+    compasses = words.compasses(sorted(app.work.chosen))
+    lines = [
+        f"Write {len(rows)} parameters of {compasses} to {words.vehicle(plan.vehicle)}?",
+        f"Backup: {backup}",
+        *app.writing.warnings,
+    ]
+    dialog = Confirm("Write to the vehicle?", "\n".join(lines), yes="Write", no="Cancel")
+    app.push_screen(dialog, lambda sure: _write(app, plan, backup) if sure else None)
+
+
+def _write(app: MagcompApp, plan: WritePlan, backup: Path) -> None:
+    session = app.session
+    if session is None:
+        return
+
+    def task(progress: Progress) -> Outcome:
+        backup.parent.mkdir(parents=True, exist_ok=True)
+        return session.upload(plan, backup, _follow(app, progress))
+
+    def then(outcome: Outcome) -> None:
+        if _ended(app, outcome, backup):
+            now = {**plan.old, **plan.new, **plan.switches}
+            app.writing = replace(
+                app.writing,
+                result=f"all {len(app.writing.rows)} parameters read back as written",
+                before=plan.old,
+                in_force=now,
+            )
+            app.set_work(replace(app.work, kept="the vehicle"))
+
+    app.run_task("writing", task, then)
+
+
+def _follow(app: MagcompApp, progress: Progress) -> Callable[[Event], None]:
+    """Make rows of what the writer tells; called on the writer's thread."""
+    share = 0.0
+
+    def show(event: Event) -> None:
+        rows = after_event(app.writing.rows, event)
+        app.writing = replace(app.writing, rows=rows)
+
+    def follow(event: Event) -> None:
+        nonlocal share
+        app.call_from_thread(show, event)
+        done = sum(1 for row in app.writing.rows if row.done) / max(len(app.writing.rows), 1)
+        share = max(share, done)
+        progress("", share)
+
+    return follow
+
+
+def _ended(app: MagcompApp, outcome: Outcome, backup: Path) -> bool:
+    """Say how a write ended; tell whether it was good."""
+    try:
+        raise_for_failure(outcome, backup, app.work.source)
+    except MagcompError as error:
+        app.writing = replace(app.writing, result=f"not written; {outcome.standing.value}")
+        app.complain(error)
+        return False
+    return True
+
+
+# ------------------------------------------------------------------------ undo
+
+
+def ask_undo(app: MagcompApp) -> None:
+    """Compare the vehicle with the backup, and ask."""
+    session, backup = app.session, app.writing.backup
+    if session is None or backup is None or not app.writing.in_force:
+        app.notify("Nothing was written to a vehicle, so there is nothing to undo.")
+    elif _may_write(app):
+        app.run_task(
+            "reading what the vehicle holds",
+            lambda _: session.restore_plan(backup),
+            lambda plan: _confirm_undo(app, plan, backup),
+        )
+
+
+def _confirm_undo(app: MagcompApp, plan: WritePlan, backup: Path) -> None:
+    lines = f"Bring back {len(plan.changes)} parameters from the backup?\n{backup}"
+    dialog = Confirm("Undo?", lines, yes="Undo", no="Keep")
+    app.push_screen(dialog, lambda sure: _undo(app, plan, backup) if sure else None)
+
+
+def _undo(app: MagcompApp, plan: WritePlan, backup: Path) -> None:
+    session = app.session
+    second = _backup(app)
+    if session is None or second is None:
+        return
+    app.writing = replace(
+        app.writing,
+        rows=tuple(
+            ChangeRow(change.name, format_value(change.old), format_value(change.new))
+            for change in plan.changes
+        ),
+    )
+
+    def then(outcome: Outcome) -> None:
+        if _ended(app, outcome, second):
+            prepare(app)
+            app.writing = replace(app.writing, result="undone: everything is as it was before")
+            app.set_work(replace(app.work, kept=""))
+
+    app.run_task(
+        "undoing",
+        lambda progress: session.restore(backup, plan, second, _follow(app, progress)),
+        then,
+    )
+
+
+def _backup(app: MagcompApp) -> Path | None:
+    vehicle = app.live.vehicle if app.live is not None else None
+    try:
+        return app.services.new_file("backup", ".param", vehicle)
+    except MagcompError as error:
+        app.complain(error)
+        return None
