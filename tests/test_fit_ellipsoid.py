@@ -55,7 +55,7 @@ def test_noisy_readings_give_them_within_a_few_standard_errors(seed):
 
 def test_the_covariance_is_what_repetition_shows():
     """Squared errors weighed by the stated covariance average to the number of parameters."""
-    squares = []
+    squares, of_centre = [], []
     for seed in range(80):
         found = fit_ellipsoid(readings(np.random.default_rng(seed)), STRENGTH)
         error = np.concatenate(
@@ -66,8 +66,10 @@ def test_the_covariance_is_what_repetition_shows():
             ]
         )
         squares.append(error @ np.linalg.solve(found.covariance, error))
+        of_centre.append(error[6:] @ np.linalg.solve(found.centre_covariance(0), error[6:]))
     # χ² of 9 degrees: mean 9, and the mean of 80 within 3 · √(18 / 80); 25 % for the estimate.
     assert 9.0 / 1.25 - 1.4 < np.mean(squares) < 9.0 * 1.25 + 1.4
+    assert 3.0 / 1.25 - 0.8 < np.mean(of_centre) < 3.0 * 1.25 + 0.8
 
 
 @pytest.mark.parametrize("share", [0.05, 0.1])
