@@ -149,10 +149,11 @@ def parameters(messages: Messages, autopilot: str, simulation: bool) -> list[Par
             rows = table["param_type"] == kind
             width = np.dtype(code).itemsize
             value[rows] = np.ascontiguousarray(raw[rows, :width]).view(code)[:, 0]
+    rows = zip(time.tolist(), text(table["param_id"]), value.tolist(), strict=True)
     return [
-        ParameterChange(*change)
-        for change in zip(time.tolist(), text(table["param_id"]), value.tolist(), strict=True)
-        if change[1].startswith(_SIMULATION_PREFIX) is simulation
+        change
+        for change in map(ParameterChange._make, rows)
+        if change.name.startswith(_SIMULATION_PREFIX) is simulation
     ]
 
 

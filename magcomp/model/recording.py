@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,9 +98,11 @@ class ReadReport:
     others: tuple[tuple[int, int], ...] = ()
 
 
-@dataclass(frozen=True)
-class ParameterChange:
-    """A parameter's value as the vehicle reported it at ``time`` (seconds)."""
+class ParameterChange(NamedTuple):
+    """A parameter's value as the vehicle reported it at ``time`` (seconds).
+
+    A tuple, because a log holds thousands and a dataclass each would take a tenth of its reading.
+    """
 
     time: float
     name: str
