@@ -151,6 +151,18 @@ def test_a_current_rebuilt_from_the_outputs_does_not_bias_a_slope_where_interpol
     assert np.mean(rebuilt) == pytest.approx(1.0, abs=0.01)
 
 
+@pytest.mark.parametrize("late", [0.0, 0.1, 0.2])
+def test_a_rebuilt_current_is_as_late_as_the_reported_one(late):
+    """The fit estimates one lag for a form; rebuilding must not add another."""
+    recording, time, true = fast_current(2)
+    slow = recording.current.time
+    delayed = Series(slow, np.interp(slow - late, time, true))
+    rebuilt = controls(replace(recording, current=delayed))[1].series
+    inside = slice(20, -20)
+    expected = np.interp(rebuilt.time[inside] - late, time, true)
+    assert np.std(rebuilt.value[inside] - expected) < 0.15 * np.std(true)
+
+
 def test_a_rebuilt_current_never_falls_below_nothing():
     recording, _, _ = fast_current(0)
     assert controls(recording)[1].series.value.min() >= 0.0
