@@ -146,7 +146,7 @@ def test_nobody_is_told_to_descend_when_low_or_of_unknown_height(height):
 
 def test_a_flight_ends_when_the_answer_is_good_and_no_longer_changes():
     seen = coverage(l2=headings(range(6)), l3=headings(range(SECTORS)), l4=headings(range(6)))
-    enough = view(Situation.FLYING, coverage=seen, seconds=90.0, grade=Grade.GOOD, stable_refits=3)
+    enough = view(Situation.FLYING, coverage=seen, seconds=90.0, grade=Grade.GOOD, stable_refits=2)
     assert guide(enough).enough
     assert "land and disarm" in guide(enough).text
     assert not guide(replace(enough, stable_refits=1)).enough
@@ -167,7 +167,7 @@ def test_a_held_vehicle_is_turned_then_tilted_then_given_more_throttle():
 
 def test_three_levels_and_a_steady_answer_end_a_held_measurement():
     seen = coverage(l0=range(40), l2=range(40), l4=range(40))
-    held = view(Situation.HELD, coverage=seen, throttle=0.4, grade=Grade.GOOD, stable_refits=3)
+    held = view(Situation.HELD, coverage=seen, throttle=0.4, grade=Grade.GOOD, stable_refits=2)
     assert guide(held).enough
     waiting = guide(replace(held, stable_refits=0))
     assert not waiting.enough

@@ -56,7 +56,7 @@ THROTTLES_ENOUGH = 3
 _THROTTLE_SHARE_S = 2.0
 _HELD_LEVELS = (0, 2, 4, 3, 1, 5)
 _LOW_M = 8.0
-_STABLE_REFITS = 3
+_STABLE_REFITS = 2
 
 
 class Situation(StrEnum):

@@ -13,9 +13,10 @@ from magcomp.autopilot import ardupilot
 from magcomp.buffer import Coverage
 from magcomp.geometry import heading
 from magcomp.link import LinkStatistics
-from magcomp.model import THROTTLE, Analysis, CompassResult, Grade, Vehicle
+from magcomp.model import THROTTLE, Analysis, Grade, MotorFit, Vehicle
 from magcomp.session.guide import Guidance, Situation
 from magcomp.session.latest import Now, Vector
+from magcomp.session.refit import Refit
 
 _PLAUSIBLE = (150.0, 900.0)
 """mGauss: the earth's field is 220 … 670; motors and a bad calibration add to it."""
@@ -36,7 +37,8 @@ class CompassNow:
     heading_deg
         Magnetic, 0 … 360; None without attitude.
     heading_corrected_deg
-        The same with the correction of the newest analysis; None before the first.
+        The same with the newest correction, brought up to date about each second; None before
+        the first analysis.
     healthy
         Its readings come, and could be the earth's field.
     grade
@@ -142,12 +144,13 @@ class LiveSnapshot:
 
 
 def compasses_now(
-    now: Now, parameters: Mapping[str, float], analysis: Analysis | None
+    now: Now, parameters: Mapping[str, float], refit: Refit
 ) -> tuple[CompassNow, ...]:
-    """Work out each compass's heading, as it is and as it would be with the new correction."""
-    results = {result.fit.compass: result for result in analysis.compasses} if analysis else {}
+    """Work out each compass's heading, as it is and as it would be with the newest correction."""
+    results = refit.analysis.compasses if refit.analysis else ()
+    grades = {result.fit.compass: result.verdict.grade for result in results}
     return tuple(
-        _compass_now(number, field, now, parameters, results.get(number))
+        _compass_now(number, field, now, parameters, refit.fresh.get(number), grades.get(number))
         for number, field in sorted(now.fields.items())
     )
 
@@ -157,10 +160,11 @@ def _compass_now(
     field: Vector,
     now: Now,
     parameters: Mapping[str, float],
-    result: CompassResult | None,
+    fit: MotorFit | None,
+    grade: Grade | None,
 ) -> CompassNow:
     strength = math.hypot(*field)
-    corrected = None if result is None else _corrected(field, now, parameters, result)
+    corrected = None if fit is None else _corrected(field, now, parameters, fit)
     return CompassNow(
         number=number,
         field=field,
@@ -168,22 +172,22 @@ def _compass_now(
         heading_deg=_heading_deg(field, now),
         heading_corrected_deg=None if corrected is None else _heading_deg(corrected, now),
         healthy=_PLAUSIBLE[0] < strength < _PLAUSIBLE[1],
-        grade=None if result is None else result.verdict.grade,
+        grade=grade,
     )
 
 
 def _corrected(
-    field: Vector, now: Now, parameters: Mapping[str, float], result: CompassResult
+    field: Vector, now: Now, parameters: Mapping[str, float], fit: MotorFit
 ) -> Vector | None:
     """Undo the correction in force and apply the fitted one."""
-    present = ardupilot.calibration(parameters, result.fit.compass)
+    present = ardupilot.calibration(parameters, fit.compass)
     by_throttle = present.compensation is ardupilot.MotorCompensation.THROTTLE
     u_present = now.throttle if by_throttle else now.current
-    u_new = now.throttle if result.fit.regressor == THROTTLE else now.current
+    u_new = now.throttle if fit.regressor == THROTTLE else now.current
     if u_new is None or (u_present is None and present.motor.any()):
         return None
     raw = ardupilot.uncorrect(np.array(field), np.array(u_present or 0.0), present)
-    x, y, z = result.fit.correction.apply(raw[None, :], np.array([u_new]))[0].tolist()
+    x, y, z = fit.correction.apply(raw[None, :], np.array([u_new]))[0].tolist()
     return x, y, z
 
 
