@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from synthetic import Flown
+from synthetic import Flown, problem_of
 
 from magcomp.align import controls, interpolate, reported
 from magcomp.model import CURRENT, THROTTLE, ParameterChange, ParameterHistory, Recording, Series
@@ -173,3 +173,15 @@ def test_outputs_that_say_nothing_of_the_current_are_not_used():
     rng = np.random.default_rng(9)
     noise = outputs(time, np.clip(0.4 + 0.1 * rng.normal(size=len(time)), 0.05, 0.95))
     assert [c.origin for c in controls(replace(recording, outputs=noise))] == ["battery current"]
+
+
+def test_readings_in_a_gap_of_the_current_are_left_out():
+    recording = Flown(seconds=60.0).recording()
+    current = recording.current
+    kept = (current.time < 20.0) | (current.time > 40.0)
+    torn = replace(recording, current=Series(current.time[kept], current.value[kept]))
+    problem = problem_of(torn)
+    times = problem.readings.time
+    assert not np.any((times > 20.5) & (times < 39.5))
+    assert np.any(times < 20.0)
+    assert np.any(times > 40.0)

@@ -103,3 +103,9 @@ def test_a_sweep_holds_no_turns_for_the_method_of_levels():
     with pytest.raises(FitRejectedError, match="turns about all axes") as caught:
         fit(Swept().problem(), "levels")
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("lag", [0.05, 0.3])
+def test_the_lag_of_a_sweep_in_sudden_steps_lies_within_three_standard_errors(lag):
+    found = fit(Swept(current_lag=lag).problem(), "sweep")
+    assert abs(found.lags.regressor - lag) < 3 * found.lags_std.regressor

@@ -80,6 +80,12 @@ def readings(
     )
 
 
+def within(readings: Readings, known: Series) -> Readings:
+    """The readings at times where another quantity is known, not interpolated across a gap."""
+    inside = ~_in_gap(readings.time, known.time)
+    return readings if inside.all() else readings.where(inside)
+
+
 def _list_compasses(recording: Recording) -> str:
     present = sorted(recording.field)
     return f"compass {', '.join(map(str, present))}" if present else "no compass at all"

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from magcomp.align import sample
+from magcomp.align import sample, within
 from magcomp.earth import EarthField
 from magcomp.fit.robust import ROUNDS, Estimate, Prior, solve, time_blocks
 from magcomp.model import (
@@ -71,7 +71,7 @@ class Problem:
     Attributes
     ----------
     readings
-        The compass.
+        The compass; readings in gaps of the control quantity are left out.
     control
         The regressor.
     in_force
@@ -84,6 +84,9 @@ class Problem:
     control: Control
     in_force: Mapping[str, Control]
     earth: EarthField
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "readings", within(self.readings, self.control.series))
 
     def where(self, keep: BoolArray) -> Problem:
         """The same with fewer readings."""

@@ -35,6 +35,7 @@ STILL_SHARE = 0.02
 
 _START, _SLOPE, _LAG = slice(0, 3), slice(3, 6), 6
 _SIZE = 7
+_LAGS_TRIED = np.arange(-0.1, 0.501, 0.05)
 
 
 def is_still(samples: Samples) -> bool:
@@ -75,7 +76,7 @@ def fit_sweep(problem: Problem, *, lag: float | None = None) -> MotorFit:
     found in raw space becomes MOT = −s · D · g".
     """
     begin = np.zeros(_SIZE)
-    begin[_LAG] = LAG_MEAN_S if lag is None else lag
+    begin[_LAG] = _nearest_lag(problem) if lag is None else lag
     at_start = problem.sample(Lags(0.0, float(begin[_LAG])))
     if not np.ptp(at_start.u) > 0.0:
         raise FitRejectedError(
@@ -87,6 +88,7 @@ def fit_sweep(problem: Problem, *, lag: float | None = None) -> MotorFit:
     width = np.full(_SIZE, np.inf)
     width[_LAG] = LAG_WIDTH_S if lag is None else 0.0
     mean = begin.copy()
+    mean[_LAG] = LAG_MEAN_S if lag is None else lag
 
     def residuals(parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
         rows = problem.sample(Lags(0.0, float(parameters[_LAG])))
@@ -106,6 +108,24 @@ def fit_sweep(problem: Problem, *, lag: float | None = None) -> MotorFit:
         feasible=lambda p: bool(abs(p[_LAG]) < LAG_MOST_S),
     )
     return _answer(problem, found.parameters, found.covariance, float(np.max(found.noise)))
+
+
+def _nearest_lag(problem: Problem) -> float:
+    """The lag of a coarse search: steps of the control quantity make many local minima."""
+
+    def left(lag: float) -> float:
+        rows = problem.sample(Lags(0.0, lag))
+        design = np.column_stack([np.ones(len(rows)), rows.u])
+        line = np.linalg.lstsq(design, rows.raw, rcond=None)[0]
+        return float(np.sum(np.abs(rows.raw - design @ line)))
+
+    return float(min(_LAGS_TRIED, key=left))
+
+
+def _lag_std(problem: Problem, stated: float) -> float:
+    """Standard error of a lag seen in steps: no better than when the steps were sampled."""
+    interval = float(np.median(np.diff(problem.control.series.time)))
+    return float(np.hypot(stated, interval / np.sqrt(12.0)))
 
 
 def _answer(
@@ -133,7 +153,7 @@ def _answer(
         covariance=full,
         free=frozenset({"motor"}),
         lags=Lags(np.nan, float(parameters[_LAG])),
-        lags_std=Lags(np.nan, float(np.sqrt(covariance[_LAG, _LAG]))),
+        lags_std=Lags(np.nan, _lag_std(problem, float(np.sqrt(covariance[_LAG, _LAG])))),
         strength=float(np.median(np.linalg.norm(corrected, axis=1))),
         vertical=float(np.median(np.einsum("ij,ij->i", corrected, samples.down))),
         noise=noise,

@@ -41,6 +41,7 @@ def emit(
             _accepted(recording, fit, fitted)
             if verdict.grade is not Grade.REJECTED
             else _neutral(fit, in_force),
+            "diagonal" in fit.free,
         )
         for fit, verdict, in_force in results
     }
@@ -50,7 +51,10 @@ def emit_anyway(recording: Recording, fits: Sequence[MotorFit]) -> Mapping[int, 
     """Parameters of each compass whatever the verdict, for a user who insists."""
     fitted = [fit.compass for fit in fits]
     return {
-        fit.compass: _for_this_vehicle(recording, _accepted(recording, fit, fitted)) for fit in fits
+        fit.compass: _for_this_vehicle(
+            recording, _accepted(recording, fit, fitted), "diagonal" in fit.free
+        )
+        for fit in fits
     }
 
 
@@ -83,14 +87,21 @@ def _neutral(fit: MotorFit, in_force: InForce) -> dict[str, float]:
     return ardupilot.vector_parameters("MOT", fit.compass, np.zeros(3))
 
 
-def _for_this_vehicle(recording: Recording, parameters: dict[str, float]) -> dict[str, float]:
+def _for_this_vehicle(
+    recording: Recording, parameters: dict[str, float], fitted: bool
+) -> dict[str, float]:
     """Without the names this firmware does not know, or all of a correction where none is known."""
     known = recording.parameters.names
     if not known:
         return {name: v for name, v in parameters.items() if "_MOT" in name}
     if not any(name.startswith("COMPASS_MOT") for name in known):
         return parameters
-    return {name: value for name, value in parameters.items() if name in known}
+    # A soft iron that was fitted belongs to its offsets, even where the log's list is not whole.
+    return {n: value for n, value in parameters.items() if n in known or _is_fitted(n, fitted)}
+
+
+def _is_fitted(name: str, fitted_soft_iron: bool) -> bool:
+    return fitted_soft_iron and ("_DIA" in name or "_ODI" in name)
 
 
 def parameter_set(analysis: Analysis, *, include_rejected: bool = False) -> ParameterSet:
