@@ -220,7 +220,18 @@ def _axis(frames: Frames, stamp: OffsetArray, rows: dict[int, NDArray[np.intp]])
             at_sending = message != Message.GLOBAL_POSITION_INT
             groups.append(Stamps(stamped, stamp[stamped], wrap, at_sending))
     leading = sum(message in rows for message in _LEADING)
-    return time_axis(frames.arrival, frames.payload, groups[:leading], groups[leading:])
+    return time_axis(frames.arrival, _place(frames), groups[:leading], groups[leading:])
+
+
+def _place(frames: Frames) -> OffsetArray:
+    """Place of each frame in the stream, in bytes of the messages a Recording is made of.
+
+    Not the place in the file: a live buffer leaves out what no fit needs, and must give the same
+    times as its own .tlog.
+    """
+    counts = np.isin(frames.message, tuple(WANTED))
+    place: OffsetArray = np.cumsum(np.where(counts, frames.length.astype(np.int64) + 1, 0))
+    return place
 
 
 def _in_order(time: FloatArray, table: Table) -> Timed:
