@@ -12,6 +12,8 @@ Rules
 3. A frame is the vehicle's when system *and* component are its own.
 4. Three seconds without a frame of the vehicle are a gap, dated from the last one.
 5. A vehicle whose clock runs back by more than two seconds, three messages in a row, rebooted.
+6. A vehicle that talks, but has sent none of its streams for four seconds, has forgotten them, as
+   after a reboot whose silence was too short to notice: it is asked for everything anew.
 """
 
 from __future__ import annotations
@@ -35,6 +37,7 @@ SILENCE_S = 3.0
 SETTLING_S = 1.5
 """Other vehicles send heartbeats each second: by then they would have been heard."""
 
+FORGOTTEN_S = 4.0
 _CLOCK_BACK_MS = 2000
 _CLOCK_BACK_TIMES = 3
 _OUTSTANDING = 16
@@ -72,6 +75,7 @@ class LinkState:
         self._known: Vehicle | None = None
         self._identification: Identification | None = None
         self._streams: StreamControl | None = None
+        self._streaming_at = math.inf
         self._sequence = SequenceCounter()
         self._meter = RateMeter()
         self._last_heard = -math.inf
@@ -218,6 +222,9 @@ class LinkState:
         if self._identification is not None:
             out += self._identification.due(now)
         if self._streams is not None:
+            if self._streams.wanted and now - self._streaming_at > FORGOTTEN_S:
+                self._streaming_at = now
+                self._ask_again()
             out += self._streams.due(now)
         if now >= self._next_timesync:
             self._next_timesync = now + TIMESYNC_S
@@ -247,6 +254,8 @@ class LinkState:
             self._identification.heard(message)
         if self._streams is not None:
             self._streams.heard(message)
+            if message.get_type() in self._streams.wanted:
+                self._streaming_at = now
         return Received(frame, from_vehicle=not self.ambiguous())
 
     def _take_heartbeat(self, message: Message, now: float) -> None:

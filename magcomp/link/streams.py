@@ -149,6 +149,11 @@ class StreamControl:
         return not (self._asking or self._setting or self._streams)
 
     @property
+    def wanted(self) -> Mapping[str, float]:
+        """Message name to the Hz that shall come; empty once the old rates are given back."""
+        return {} if self._restoring else self._wanted
+
+    @property
     def report(self) -> StreamReport:
         """How things stand."""
         return StreamReport(

@@ -54,9 +54,11 @@ _LOOK_S = 0.2
 _STREAMS_S = 6.0
 _MOTOR_NAMES = (
     *(f"MOT_{name}" for name in ("THST_EXPO", "SPIN_MIN", "SPIN_MAX", "PWM_MIN", "PWM_MAX")),
-    *(f"SERVO{n}_FUNCTION" for n in range(1, 9)),
     *("COMPASS_LEARN", "COMPASS_USE", "COMPASS_USE2", "COMPASS_USE3", "BATT_MONITOR"),
 )
+_OUTPUT_NAMES = tuple(f"SERVO{n}_FUNCTION" for n in range(1, 9))
+"""Nice to know, and not there on small boards: asking in vain takes seconds."""
+
 _NOTHING = Now(0, None, {}, (), None, None, None, None, None, None, False)
 
 
@@ -113,15 +115,14 @@ class LiveSession:
         self._notes: list[str] = []
         self._trouble = ""
         self._failure: MagcompError | None = None
+        self._refits = (options, refit_share)
+        self._refitter: Refitter | None = None
         self._threads = [
             threading.Thread(target=work, name=f"magcomp-{name}", daemon=True)
             for name, work in (("prepare", self._prepare), ("watch", self._watch))
         ]
         for thread in self._threads:
             thread.start()
-        self._refitter = (
-            Refitter(self._prepared_recording, options, share=refit_share) if refit_share else None
-        )
 
     @classmethod
     def open(
@@ -388,11 +389,11 @@ class LiveSession:
     def close(self) -> None:
         """Restore the stream rates, close link and file. Closing twice is harmless."""
         self._stop.set()
-        if self._refitter is not None:
-            self._refitter.close()
         self.connection.close()
         for thread in self._threads:
             thread.join()
+        if self._refitter is not None:
+            self._refitter.close()
         self._tap.close()
 
     # ---------------------------------------------------------------- the threads
@@ -401,15 +402,27 @@ class LiveSession:
         """Find the vehicle, ask for its streams, read its calibration."""
         try:
             vehicle = self._wait_for_vehicle()
-            if vehicle is not None and not isinstance(self.connection.address, Replay):
-                with self._asked:
+            live = vehicle is not None and not isinstance(self.connection.address, Replay)
+            with self._asked:
+                if vehicle is not None and live:
                     self.connection.request_streams(self._rates, _STREAMS_S)
                     self._streaming_since = self._clock.monotonic()
-                    self._read_calibration(vehicle)
+                    names = relevant_names(vehicle.autopilot, ParameterSet({}))
+                    self._read(vehicle, (*names, *_MOTOR_NAMES))
+                self._begin_refits()
+                self._ready.set()
+                if vehicle is not None and live:
+                    self._read(vehicle, _OUTPUT_NAMES)
         except MagcompError as error:
-            self._failure = error
+            if not self._ready.is_set():
+                self._failure = error
             self._trouble = str(error)
         self._ready.set()
+
+    def _begin_refits(self) -> None:
+        options, share = self._refits
+        if share and not self._stop.is_set():
+            self._refitter = Refitter(self.recording, options, share=share)
 
     def _wait_for_vehicle(self) -> Vehicle | None:
         while not self._stop.is_set() and not self.connection.ended:
@@ -419,8 +432,7 @@ class LiveSession:
                 self._trouble = str(error)
         return None
 
-    def _read_calibration(self, vehicle: Vehicle) -> None:
-        names = (*relevant_names(vehicle.autopilot, ParameterSet({})), *_MOTOR_NAMES)
+    def _read(self, vehicle: Vehicle, names: tuple[str, ...]) -> None:
         self.connection.discard()
         fetch(self.connection, vehicle, names, clock=time.monotonic)
 
@@ -449,11 +461,6 @@ class LiveSession:
         self._notes = [*self._notes[-4:], text]
 
     # ---------------------------------------------------------------- inside
-
-    def _prepared_recording(self) -> Recording:
-        if not self._ready.is_set():
-            raise LinkError("the vehicle's calibration is still being read")
-        return self.recording()
 
     def _known_vehicle(self) -> Vehicle:
         vehicle = self.connection.vehicle

@@ -20,7 +20,7 @@ from magcomp.model import Analysis, MotorFit, Recording
 from magcomp.session.analyse import Options, analyse
 from magcomp.session.refresh import refresh
 
-DEFAULT_SHARE = 0.09
+DEFAULT_SHARE = 0.08
 """Share of one core that all this may take, on average."""
 
 LEAST_PAUSE_S = 1.0
