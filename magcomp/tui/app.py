@@ -6,6 +6,7 @@ in opening.py, fitting.py and writing.py.
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -126,6 +127,7 @@ class MagcompApp(App[None]):
         self.session: Session | None = None
         self.simulation: Simulation | None = None
         self.busy: Busy | None = None
+        self.stopping = threading.Event()
         self.choices: tuple[Choice, ...] = ()
         for theme in THEMES:
             self.register_theme(theme)
@@ -191,11 +193,17 @@ class MagcompApp(App[None]):
 
     def _done(self, then: Callable[[_T], None], result: _T) -> None:
         self.busy = None
+        if self.stopping.is_set():
+            self._close()
+            return
         then(result)
         self.redraw()
 
     def _failed(self, error: Exception) -> None:
         self.busy = None
+        if self.stopping.is_set():
+            self._close()
+            return
         self.redraw()
         self.complain(error)
 
@@ -310,7 +318,7 @@ class MagcompApp(App[None]):
 
     async def action_quit(self) -> None:
         """Quit; ask where results would be lost or a vehicle is being written."""
-        question = status.quit_question(self.work, self.busy is not None)
+        question = status.quit_question(self.work, self.busy.what if self.busy else "")
         if question and not isinstance(self.screen, Confirm):
             dialog = Confirm("Quit?", question, yes="Quit", no="Stay")
             self.push_screen(dialog, lambda sure: self._leave() if sure else None)
@@ -318,8 +326,19 @@ class MagcompApp(App[None]):
             self._leave()
 
     def _leave(self) -> None:
-        self.run_worker(lambda: opening.close(self), thread=True, exit_on_error=False)
-        self.exit()
+        """Stop what is being done, then give everything back, then end."""
+        self.stopping.set()
+        if self.busy is None:
+            self._close()
+
+    def _close(self) -> None:
+        def close() -> None:
+            opening.close(self)
+            self.call_from_thread(self.exit)
+
+        self.busy = Busy("closing the link")
+        self.redraw()
+        self.run_worker(close, thread=True, exit_on_error=False)
 
     # ---------------------------------------------------------------- palette, themes, keys
 

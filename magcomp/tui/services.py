@@ -15,6 +15,7 @@ from magcomp.link import SerialPort, serial_ports
 from magcomp.log import read
 from magcomp.model import Analysis, ParameterSet, Recording, Vehicle, Verdict
 from magcomp.parameters.events import Event, Outcome
+from magcomp.parameters.journal import journal_path
 from magcomp.parameters.plan import WritePlan
 from magcomp.report.evidence import compass_plots
 from magcomp.session import Options, analyse, check
@@ -51,6 +52,7 @@ class Session(Protocol):
         plan: WritePlan,
         backup_path: Path,
         on_event: Callable[[Event], None],
+        stop: Callable[[], bool],
     ) -> Outcome:
         """Write and verify, or put everything back."""
         ...
@@ -65,6 +67,7 @@ class Session(Protocol):
         plan: WritePlan,
         backup_path: Path,
         on_event: Callable[[Event], None],
+        stop: Callable[[], bool],
     ) -> Outcome:
         """Write what `restore_plan` made."""
         ...
@@ -173,7 +176,14 @@ class Services:
             No file can be made there.
         """
         path = new_file(kind, suffix, vehicle, self.now().timestamp())
-        return path if self.folder is None else self.folder / path.name
+        if self.folder is None:
+            return path
+        name, number = path.stem, 2
+        path = self.folder / path.name
+        while path.exists() or journal_path(path).exists():
+            path = self.folder / f"{name}-{number}{suffix}"
+            number += 1
+        return path
 
 
 def judge_present(recording: Recording) -> Mapping[int, Verdict]:

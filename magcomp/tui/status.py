@@ -9,6 +9,10 @@ from magcomp.tui.widgets.top_bar import STEPS, Status
 from magcomp.tui.work import Work
 
 
+WRITING = "writing"
+"""What is being done while a vehicle is written."""
+
+
 def road(work: Work) -> tuple[str, ...]:
     """Steps for what is in hand; a log has nothing to record and nothing to verify."""
     return tuple(STEPS) if work.live or not work.source else ("connect", "fit", "review")
@@ -57,10 +61,10 @@ def status(work: Work, live: LiveSnapshot | None) -> Status:
     return Status(name, f"{state}  link good, {100 * live.link.loss:.0f} % lost".strip())
 
 
-def quit_question(work: Work, busy: bool) -> str:
+def quit_question(work: Work, doing: str) -> str:
     """What would be lost by quitting; empty where nothing."""
-    if busy:
-        return "Something is being done at the moment. Quit all the same?"
+    if doing == WRITING:
+        return "The vehicle is being written. Quitting puts everything back first. Quit?"
     if work.unwritten:
         return "The results are not written anywhere yet. Quit all the same?"
     return ""

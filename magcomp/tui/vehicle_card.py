@@ -64,7 +64,7 @@ def calibration_facts(
     if not parameters:
         return
     switch = parameters.get(ardupilot.COMPENSATION_SWITCH, 0.0)
-    yield "Motor compensation", f"{_SWITCH_WORDS.get(switch, 'unknown')} (COMPASS_MOTCT {switch:g})"
+    yield "Compensation", f"{_SWITCH_WORDS.get(switch, 'unknown')} (COMPASS_MOTCT {switch:g})"
     for compass in compasses:
         held = ardupilot.calibration(parameters, compass)
         offset = ", ".join(words.number(float(v), 0) for v in held.offset)
@@ -92,7 +92,7 @@ def _compasses(compasses: list[int], vehicle: Vehicle) -> str:
     if not compasses:
         return "none"
     ids = ", ".join(map(str, vehicle.device_ids))
-    return f"{words.listed(compasses)}{f' (device ids {ids})' if ids else ''}"
+    return f"{words.listed(compasses)}{f' (ids {ids})' if ids else ''}"
 
 
 def _quantities(recording: Recording) -> str:

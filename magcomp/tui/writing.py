@@ -17,6 +17,7 @@ from magcomp.report import words
 from magcomp.tui.changes import ChangeRow, after_event, change_rows, left_out_warnings
 from magcomp.tui.screens.dialogs import AskText, Confirm, Message
 from magcomp.tui.services import Progress
+from magcomp.tui.status import WRITING
 from magcomp.tui.work import Work, Writing
 
 if TYPE_CHECKING:
@@ -156,7 +157,7 @@ def _write(app: MagcompApp, plan: WritePlan, backup: Path) -> None:
 
     def task(progress: Progress) -> Outcome:
         backup.parent.mkdir(parents=True, exist_ok=True)
-        return session.upload(plan, backup, _follow(app, progress))
+        return session.upload(plan, backup, _follow(app, progress), app.stopping.is_set)
 
     def then(outcome: Outcome) -> None:
         if _ended(app, outcome, backup):
@@ -169,7 +170,7 @@ def _write(app: MagcompApp, plan: WritePlan, backup: Path) -> None:
             )
             app.set_work(replace(app.work, kept="the vehicle"))
 
-    app.run_task("writing", task, then)
+    app.run_task(WRITING, task, then)
 
 
 def _follow(app: MagcompApp, progress: Progress) -> Callable[[Event], None]:
@@ -243,8 +244,10 @@ def _undo(app: MagcompApp, plan: WritePlan, backup: Path) -> None:
             app.set_work(replace(app.work, kept=""))
 
     app.run_task(
-        "undoing",
-        lambda progress: session.restore(backup, plan, second, _follow(app, progress)),
+        WRITING,
+        lambda progress: session.restore(
+            backup, plan, second, _follow(app, progress), app.stopping.is_set
+        ),
         then,
     )
 

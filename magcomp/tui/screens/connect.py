@@ -39,6 +39,10 @@ class TargetList(OptionList):
 class AddressInput(Input):
     """An address or a path, typed."""
 
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("escape", "screen.choose", "Back to the list", id="connect.list"),
+    ]
+
     HELP = """\
 **Address or log.** Type where the vehicle is, or the path of a log, and press Enter:
 
@@ -152,11 +156,16 @@ class ConnectScreen(StepScreen):
         elif live is not None and work.card is None:
             self.say(f"Wait: {live.guidance.text}. X gives up. {words.sentence(live.link_text)}")
         elif work.card is None:
-            self.say("Choose with the arrow keys and press Enter, or press A and type an address.")
+            self.say("Choose with the arrows and press Enter, or press A to type.")
         elif work.live:
             self.say("Press N to record. X disconnects.")
         else:
             self.say("Press N to see the fit of this log. X closes it.")
+
+    def on_resize(self) -> None:
+        """Fill the list anew: how many lines a choice has depends on the room."""
+        self._choices = ()
+        self.redraw()
 
     def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
         """Connect to a line of the list."""
@@ -169,6 +178,7 @@ class ConnectScreen(StepScreen):
     def on_input_submitted(self, event: Input.Submitted) -> None:
         """Connect to what was typed."""
         if event.value.strip():
+            self.action_choose()
             opening.open_target(self.magcomp, event.value.strip())
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:  # noqa: ARG002
@@ -178,6 +188,10 @@ class ConnectScreen(StepScreen):
     def action_address(self) -> None:
         """Type an address."""
         self.query_one(AddressInput).focus()
+
+    def action_choose(self) -> None:
+        """Choose from the list."""
+        self.query_one(TargetList).focus()
 
     def action_ports(self) -> None:
         """Look for serial ports again."""

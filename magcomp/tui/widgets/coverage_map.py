@@ -11,6 +11,8 @@ from magcomp.session.guide import LEVEL_ENOUGH
 from magcomp.tui.widgets.bars import bar
 
 _MANY = 20
+_NAMES = 6
+_SIGNS = (("·", "$quiet"), ("▒", "$warning"), ("█", "$success"))
 _BAND_NAMES = ("up", "", "", "", "", "down")
 
 
@@ -25,24 +27,28 @@ little, `██` enough. A level turn fills one row; tilting fills the others.
 
     def __init__(self, *, id: str | None = None) -> None:  # noqa: A002 - Textual's own name
         super().__init__(id=id)
-        self._shown: bytes | None = None
+        self._shown: object = None
 
     def show(self, coverage: Coverage) -> None:
         """Draw all levels together; nothing happens where no cell changed."""
         seen = coverage.counts.sum(axis=0)
         grade = ((seen > 0).astype(np.int8) + (seen >= _MANY)).reshape(BANDS, SECTORS)
-        key = grade.tobytes()
+        wide = min(max((self.size.width - _NAMES) // SECTORS, 2), 4)
+        high = min(max((self.size.height - 1) // BANDS, 1), 2)
+        key = (grade.tobytes(), wide, high)
         if key == self._shown:
             return
         self._shown = key
-        signs = (("··", "$quiet"), ("▒▒", "$warning"), ("██", "$success"))
+        signs = [(sign * wide, style) for sign, style in _SIGNS]
         lines = []
         for name, row in zip(_BAND_NAMES, grade, strict=True):
             cells = [signs[value] for value in row.tolist()]
             lines.append(Content.assemble((f"{name:>5} ", "$quiet"), *cells))
-        share = float((seen > 0).mean())
-        foot = f"      front right back  left  {100 * share:3.0f} %"
-        self.update(Content("\n").join([*lines, Content.styled(foot, "$quiet")]), layout=False)
+            lines += [Content.assemble(" " * _NAMES, *cells)] * (high - 1)
+        sides = "".join(f"{side:<{3 * wide}}" for side in ("front", "right", "back", "left"))
+        foot = f"{'':{_NAMES}}{sides}{100 * float((seen > 0).mean()):3.0f} %"
+        content = Content("\n").join([*lines, Content.styled(foot, "$quiet")])
+        self.update(content, layout=False)
 
 
 class LevelTable(Static):
@@ -66,11 +72,12 @@ this throttle for an ellipsoid of its own; a flight does not need that.
         rows = tuple(
             (level, round(seconds[level]), round(16 * float(fractions[level])), level in done)
             for level in range(LEVELS)
-            if seconds[level] >= 0.5 or level == now
+            if seconds[level] >= 0.5 or level == now or self.size.height > LEVELS
         )
-        if (rows, now) == self._shown:
+        width = min(max(self.size.width - 28, 8), 24)
+        if (rows, now, width) == self._shown:
             return
-        self._shown = (rows, now)
+        self._shown = (rows, now, width)
         lines = [Content.styled(" throttle      held  turned", "$quiet")]
         for level, held, sixteenths, is_done in rows:
             pointer = "▸" if level == now else " "
@@ -78,7 +85,7 @@ this throttle for an ellipsoid of its own; a flight does not need that.
             lines.append(
                 Content.assemble(
                     f"{pointer}{10 * level:3d}–{10 * level + 10:3d} % {held:4d} s ",
-                    bar(sixteenths / 16 / LEVEL_ENOUGH, 8, style="$success"),
+                    bar(sixteenths / 16 / LEVEL_ENOUGH, width, style="$success"),
                     f" {word}",
                 )
             )

@@ -1,0 +1,179 @@
+"""The road of a log: open, fit, look, change, save."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scripted
+from click.testing import CliRunner
+from scripted import press, screen, until
+from textual.widgets import Input
+from truth import FIXTURES
+
+from magcomp.cli.app import app as command_line
+from magcomp.parameters.files import read_parameter_file
+from magcomp.tui.screens.dialogs import Confirm, Message
+
+SWEEP = FIXTURES / "sweep_current.tlog"
+
+
+async def opened(pilot) -> None:
+    await until(pilot, lambda: pilot.app.work.card is not None and pilot.app.busy is None)
+
+
+async def fitted(pilot) -> None:
+    await opened(pilot)
+    await press(pilot, "n")
+    await until(pilot, lambda: pilot.app.work.analysis is not None)
+
+
+@pytest.fixture(scope="module")
+def json_answer() -> dict:
+    answered = CliRunner().invoke(command_line, ["fit", str(SWEEP), "--json"])
+    return json.loads(answered.stdout)
+
+
+async def test_a_log_named_on_the_command_line_is_open_at_once(tmp_path):
+    async with scripted.app(tmp_path, str(SWEEP)).run_test() as pilot:
+        await opened(pilot)
+        shown = screen(pilot.app)
+        assert "ArduPilot copter 4.6.3, system 1" in shown
+        assert "1, 2 and 3 (ids 97539, 131874, 263178)" in shown
+        assert "off (COMPASS_MOTCT 0)" in shown
+        assert "Press N to see the fit" in shown
+
+
+async def test_what_the_screen_shows_is_what_fit_json_prints(tmp_path, json_answer):
+    async with scripted.app(tmp_path, str(SWEEP)).run_test(size=(120, 60)) as pilot:
+        await fitted(pilot)
+        for compass in json_answer["compasses"]:
+            await press(pilot, str(compass["compass"]))
+            await pilot.pause()
+            shown = screen(pilot.app)
+            for row in compass["heading_error_deg"]:
+                for value in (row["before"], row["after"], row["p95"]):
+                    assert f"{value:.1f}°" in shown
+            residual = compass["field_residual_mgauss"]
+            assert f"{residual['held_out_before']:.1f} → {residual['after']:.1f}" in shown
+            assert f"unseen {residual['held_out']:.1f}" in shown
+            for value, std in zip(
+                compass["interference_mgauss"], compass["std_mgauss"], strict=True
+            ):
+                assert f"{value:.3f} ± {std:.3f}" in shown
+            assert compass["verdict"].upper() in shown
+        held = {n: v for c in json_answer["compasses"] for n, v in c["parameters"].items()}
+        assert pilot.app.work.parameters.values == held
+
+
+async def test_every_option_can_be_changed_and_fits_again_at_once(tmp_path):
+    async with scripted.app(tmp_path, str(SWEEP)).run_test() as pilot:
+        await fitted(pilot)
+        await press(pilot, "c")
+        assert [c.fit.compass for c in pilot.app.work.analysis.compasses] == [1]
+        await press(pilot, "m")
+        assert pilot.app.work.analysis.compasses[0].fit.method == "sweep"
+        await press(pilot, "r", "r")
+        assert pilot.app.work.analysis.compasses[0].fit.regressor == "throttle"
+        await pilot.press("t")
+        first, last = pilot.app.screen.query(Input)
+        first.value, last.value = "10", "70"
+        await press(pilot, "enter")
+        assert pilot.app.work.options.start == 10.0
+        assert pilot.app.work.options.end == 70.0
+        shown = screen(pilot.app)
+        assert "M method sweep R by throttle C compass 1 T time 10 … 70 s" in shown
+
+
+async def test_a_fit_that_cannot_be_says_why_and_what_next_and_keeps_the_old_one(tmp_path):
+    async with scripted.app(tmp_path, str(SWEEP)).run_test() as pilot:
+        await fitted(pilot)
+        before = pilot.app.work
+        await pilot.press("t")
+        first, last = pilot.app.screen.query(Input)
+        first.value, last.value = "83", "83.5"
+        await press(pilot, "enter")
+        await until(pilot, lambda: isinstance(pilot.app.screen, Message))
+        assert "Next:" in screen(pilot.app)
+        assert "Traceback" not in screen(pilot.app)
+        await press(pilot, "enter")
+        assert pilot.app.work is before
+
+
+async def test_a_time_that_is_no_number_is_said_to_be_none(tmp_path):
+    async with scripted.app(tmp_path, str(SWEEP)).run_test() as pilot:
+        await fitted(pilot)
+        await pilot.press("t")
+        pilot.app.screen.query(Input).first().value = "soon"
+        await press(pilot, "enter")
+        await until(pilot, lambda: isinstance(pilot.app.screen, Message))
+        assert "instead received 'soon'" in screen(pilot.app)
+
+
+async def test_the_difference_can_be_saved_and_is_what_was_shown(tmp_path):
+    async with scripted.app(tmp_path, str(SWEEP)).run_test() as pilot:
+        await fitted(pilot)
+        await press(pilot, "n", "3", "s")
+        path = tmp_path / "compass.param"
+        pilot.app.screen.query_one(Input).value = str(path)
+        await press(pilot, "enter")
+        await until(pilot, lambda: pilot.app.work.kept)
+        saved = read_parameter_file(path)
+        assert {n for n in saved.values if "MOT3" in n} == set()
+        for row in pilot.app.writing.rows:
+            assert np.float32(row.new) == np.float32(saved.values[row.name])
+        assert "Saved to" in screen(pilot.app)
+
+
+async def test_a_file_that_exists_is_overwritten_only_after_a_question(tmp_path):
+    path = tmp_path / "compass.param"
+    path.write_text("mine\n")
+    async with scripted.app(tmp_path, str(SWEEP)).run_test() as pilot:
+        await fitted(pilot)
+        await press(pilot, "n", "s")
+        pilot.app.screen.query_one(Input).value = str(path)
+        await press(pilot, "enter")
+        await until(pilot, lambda: isinstance(pilot.app.screen, Confirm))
+        await press(pilot, "enter")  # the safe answer has the focus
+        assert path.read_text() == "mine\n"
+        assert not pilot.app.work.kept
+
+
+async def test_a_log_has_no_vehicle_to_write_to_and_no_step_to_verify(tmp_path):
+    async with scripted.app(tmp_path, str(SWEEP)).run_test() as pilot:
+        await fitted(pilot)
+        await press(pilot, "n")
+        actions = {b.binding.action for b in pilot.app.screen.active_bindings.values()}
+        assert "app.write" not in actions
+        assert "app.forward" not in actions
+
+
+@pytest.mark.parametrize(
+    ("target", "says"),
+    [
+        ("nowhere.tlog", "nowhere.tlog"),
+        ("rubbish:::", "rubbish"),
+        ("{empty}", "empty.tlog"),
+    ],
+)
+async def test_what_cannot_be_opened_gets_a_sentence_and_a_next_step(tmp_path, target, says):
+    (tmp_path / "empty.tlog").touch()
+    named = target.format(empty=tmp_path / "empty.tlog")
+    async with scripted.app(tmp_path, named).run_test() as pilot:
+        await until(pilot, lambda: "Next:" in screen(pilot.app))
+        assert says in screen(pilot.app).replace(" ", "")
+        assert "Traceback" not in screen(pilot.app)
+        await press(pilot, "enter")
+        assert not pilot.app.work.source
+
+
+async def test_logs_used_lately_are_offered_next_time(tmp_path):
+    async with scripted.app(tmp_path, str(SWEEP)).run_test() as pilot:
+        await opened(pilot)
+    later = scripted.app(tmp_path)
+    async with later.run_test(size=(120, 40)) as pilot:
+        await until(pilot, lambda: later.choices)
+        assert str(SWEEP) in {choice.target for choice in later.choices}
+        assert Path(SWEEP).name in screen(later)

@@ -1,0 +1,353 @@
+"""The road of a vehicle that does what the script says: every screen, every trouble."""
+
+from __future__ import annotations
+
+import math
+
+import made
+import pytest
+import scripted
+from scripted import ScriptedSession, press, screen, until
+
+from magcomp.errors import LinkTimeoutError, VehicleRefusedError, WriteError
+from magcomp.model import Grade
+from magcomp.parameters.files import read_parameter_file
+from magcomp.session.guide import Guidance, Situation
+from magcomp.tui import opening, writing
+from magcomp.tui.screens.dialogs import Confirm, Message
+from magcomp.tui.work import Work
+
+
+async def connected(pilot) -> None:
+    opening.open_target(pilot.app, "udp:1:2")
+    await until(pilot, lambda: pilot.app.work.card is not None and pilot.app.busy is None)
+
+
+async def fitted(pilot, *grades: Grade) -> Work:
+    """With an answer in hand, on the write screen; no fit is carried out."""
+    await connected(pilot)
+    pilot.app.set_work(made.work(*grades, live=True))
+    writing.prepare(pilot.app)
+    pilot.app.action_go("review")
+    await until(pilot, lambda: "Parameters that change" in screen(pilot.app))
+    return pilot.app.work
+
+
+def disarmed() -> ScriptedSession:
+    return ScriptedSession(made.snapshot(armed=False, situation=Situation.STILL))
+
+
+# --- connect ----------------------------------------------------------------------------------
+
+
+async def test_the_vehicle_is_shown_with_what_will_stand_in_the_way(tmp_path):
+    session = ScriptedSession(
+        made.snapshot(warnings=("there is no current sensor: throttle is used",))
+    )
+    async with scripted.app(tmp_path, session=session).run_test() as pilot:
+        await connected(pilot)
+        shown = screen(pilot.app)
+        assert "ArduPilot copter 4.6.3, system 1" in shown
+        assert "Compass 1" in shown
+        assert "offsets 12, -30, 7" in shown
+        assert "Mind: There is no current sensor: throttle is used." in shown
+
+
+async def test_a_vehicle_that_does_not_answer_is_waited_for_and_can_be_given_up(tmp_path):
+    session = ScriptedSession(
+        made.snapshot(
+            vehicle=None,
+            ready=False,
+            connected=False,
+            link_text="no heartbeat arrived at udp:1:2 within 1 s",
+            guidance=Guidance("waiting for the vehicle's heartbeat", 0.0),
+        )
+    )
+    async with scripted.app(tmp_path, session=session).run_test() as pilot:
+        await until(pilot, lambda: pilot.app.choices)
+        await press(pilot, "a", *"udp:1:2", "enter")
+        await until(pilot, lambda: "waiting for the vehicle's heartbeat" in screen(pilot.app))
+        assert "No heartbeat arrived" in screen(pilot.app)
+        await press(pilot, "x")
+        await until(pilot, lambda: not pilot.app.work.source)
+        assert session.closed
+
+
+async def test_an_address_nobody_is_at_gets_a_sentence_and_the_list_stays(tmp_path):
+    async with scripted.app(tmp_path).run_test() as pilot:
+        await until(pilot, lambda: pilot.app.choices)
+        await press(pilot, "enter")
+        await until(pilot, lambda: "Next:" in screen(pilot.app))
+        assert "/dev/ttyACM0 cannot be opened: nobody is there." in screen(pilot.app)
+        await press(pilot, "enter")
+        assert "CubeOrange" in screen(pilot.app)
+
+
+# --- record -----------------------------------------------------------------------------------
+
+
+async def test_recording_shows_everything_and_says_what_to_do_next(tmp_path):
+    session = ScriptedSession()
+    async with scripted.app(tmp_path, session=session).run_test() as pilot:
+        await connected(pilot)
+        await press(pilot, "n")
+        await until(pilot, lambda: "Turn slowly to the right." in screen(pilot.app))
+        shown = screen(pilot.app)
+        for part in (
+            "479 mG",
+            "47° NE",
+            "45° NE",
+            "42 %",
+            "24.0 A",
+            "66 %",
+            "time 01:23",
+            "compass 50 Hz",
+            "lost 1 %",
+            "recording-20250615T150640Z.tlog",
+            "ARMED",
+            "done",
+            "! ",
+        ):
+            assert part in shown
+
+
+async def test_the_map_fills_as_the_vehicle_turns(tmp_path):
+    session = ScriptedSession()
+    async with scripted.app(tmp_path, session=session).run_test() as pilot:
+        await connected(pilot)
+        await press(pilot, "n")
+        await until(pilot, lambda: "Attitudes seen" in screen(pilot.app))
+        before = screen(pilot.app).count("▒")
+        counts = session.shown.coverage.counts.copy()
+        counts[4, :12] = 1
+        session.change(coverage=type(session.shown.coverage)(counts))
+        await until(pilot, lambda: screen(pilot.app).count("▒") == before + 24)
+
+
+async def test_a_lost_link_is_shown_in_words_and_recovered_from_on_the_same_screen(tmp_path):
+    session = ScriptedSession()
+    async with scripted.app(tmp_path, session=session).run_test() as pilot:
+        await connected(pilot)
+        await press(pilot, "n")
+        await until(pilot, lambda: "link good" in screen(pilot.app))
+        session.change(connected=False)
+        await until(pilot, lambda: "LINK LOST" in screen(pilot.app))
+        assert "it goes on by itself when it is back" in screen(pilot.app)
+        session.change(connected=True)
+        await until(pilot, lambda: "link good" in screen(pilot.app))
+        assert pilot.app.current_mode == "record"
+
+
+async def test_when_it_is_enough_the_next_step_is_named(tmp_path):
+    session = ScriptedSession(made.snapshot(guidance=Guidance("that is enough", 1.0, enough=True)))
+    async with scripted.app(tmp_path, session=session).run_test() as pilot:
+        await connected(pilot)
+        await press(pilot, "n")
+        await until(pilot, lambda: "That is enough. Then press N." in screen(pilot.app))
+
+
+# --- write ------------------------------------------------------------------------------------
+
+
+async def test_writing_asks_backs_up_shows_each_parameter_and_can_be_undone(tmp_path):
+    session = disarmed()
+    before = dict(session.held)
+    async with scripted.app(tmp_path, session=session).run_test(size=(120, 40)) as pilot:
+        await fitted(pilot)
+        await press(pilot, "w")
+        await until(pilot, lambda: isinstance(pilot.app.screen, Confirm))
+        assert session.held == before
+        await press(pilot, "y")
+        await until(pilot, lambda: pilot.app.work.kept)
+        assert {row.state for row in pilot.app.writing.rows} == {"✓ read back"}
+        assert "All 13 parameters read back as written." in screen(pilot.app)
+        assert session.held["COMPASS_MOTCT"] == 2.0
+        assert session.held["COMPASS_MOT_X"] == -1.5
+        backup = read_parameter_file(pilot.app.writing.backup)
+        assert {name: backup.values[name] for name in before} == before
+
+        await press(pilot, "u")
+        await until(pilot, lambda: isinstance(pilot.app.screen, Confirm))
+        await press(pilot, "y")
+        await until(pilot, lambda: "Undone" in screen(pilot.app))
+        assert session.held == before
+        assert not pilot.app.work.kept
+
+
+async def test_the_safe_answer_writes_nothing(tmp_path):
+    session = disarmed()
+    before = dict(session.held)
+    async with scripted.app(tmp_path, session=session).run_test() as pilot:
+        await fitted(pilot)
+        await press(pilot, "w")
+        await until(pilot, lambda: isinstance(pilot.app.screen, Confirm))
+        await press(pilot, "enter")
+        assert session.held == before
+        assert not list((tmp_path / "flights").glob("backup*"))
+
+
+async def test_only_the_chosen_compasses_are_written(tmp_path):
+    session = disarmed()
+    async with scripted.app(tmp_path, session=session).run_test() as pilot:
+        await fitted(pilot)
+        await press(pilot, "2", "w")
+        await until(pilot, lambda: isinstance(pilot.app.screen, Confirm))
+        assert "compasses 1 and 3" in screen(pilot.app)
+        await press(pilot, "y")
+        await until(pilot, lambda: pilot.app.work.kept)
+        assert session.held["COMPASS_MOT2_X"] == 0.0
+        assert session.held["COMPASS_MOT3_X"] == -1.5
+
+
+async def test_a_compass_left_out_whose_stored_vector_would_act_is_warned_of(tmp_path):
+    session = disarmed()
+    async with scripted.app(tmp_path, session=session).run_test(size=(120, 40)) as pilot:
+        work = await fitted(pilot)
+        stored = work.recording.parameters.changes + (
+            type(work.recording.parameters.changes[0])(1.0, "COMPASS_MOT2_X", 9.0),
+        )
+        history = type(work.recording.parameters)(stored)
+        recording = type(work.recording)(**{**vars(work.recording), "parameters": history})
+        pilot.app.set_work(type(work)(**{**vars(work), "recording": recording}))
+        await press(pilot, "2")
+        await until(pilot, lambda: "its stored vector (9, 0, 0) will act" in screen(pilot.app))
+
+
+async def test_a_rejected_compass_cannot_be_chosen(tmp_path):
+    async with scripted.app(tmp_path, session=disarmed()).run_test() as pilot:
+        await fitted(pilot, Grade.GOOD, Grade.REJECTED)
+        await press(pilot, "2")
+        assert pilot.app.work.chosen == {1}
+        assert "[–] 2 ○ REJECTED" in screen(pilot.app)
+
+
+async def test_nothing_is_written_while_armed(tmp_path):
+    session = ScriptedSession(made.snapshot(armed=True))
+    async with scripted.app(tmp_path, session=session).run_test() as pilot:
+        await fitted(pilot)
+        await press(pilot, "w")
+        await until(pilot, lambda: "The vehicle is armed." in screen(pilot.app))
+        assert "Next: Land and disarm it, then press W." in screen(pilot.app)
+
+
+async def test_a_parameter_that_is_not_taken_is_told_with_what_stands(tmp_path):
+    session = disarmed()
+    session.refuses = "COMPASS_MOT3_Y"
+    before = dict(session.held)
+    async with scripted.app(tmp_path, session=session).run_test(size=(120, 40)) as pilot:
+        await fitted(pilot)
+        await press(pilot, "w", "y")
+        await until(pilot, lambda: isinstance(pilot.app.screen, Message))
+        await until(pilot, lambda: "the vehicle holds everything as before" in screen(pilot.app))
+        await press(pilot, "enter")
+        assert "Not written; everything as before." in screen(pilot.app)
+        assert session.held == before
+        assert not pilot.app.work.kept
+
+
+@pytest.mark.parametrize(
+    "trouble",
+    [
+        VehicleRefusedError("the vehicle must be system 1; instead it is system 2"),
+        LinkTimeoutError("system 1 must send its parameters; instead nothing came"),
+        WriteError("COMPASS_MOT_X must exist on the vehicle; instead it does not"),
+        OSError(28, "No space left on device", "backup.param"),
+        ZeroDivisionError("division by zero"),
+    ],
+)
+async def test_every_trouble_is_a_sentence_with_a_next_step(tmp_path, trouble):
+    session = disarmed()
+    session.trouble = trouble
+    async with scripted.app(tmp_path, session=session).run_test() as pilot:
+        await fitted(pilot)
+        await press(pilot, "w")
+        await until(pilot, lambda: "Next:" in screen(pilot.app))
+        assert "Traceback" not in screen(pilot.app)
+        await press(pilot, "enter")
+        assert pilot.app.is_running
+
+
+# --- verify -----------------------------------------------------------------------------------
+
+
+async def test_the_improvement_is_seen_as_the_throttle_changes(tmp_path):
+    session = disarmed()
+    session.change(armed=True, current=0.0, compasses=(_at(0.0),))
+    async with scripted.app(tmp_path, session=session).run_test(size=(120, 40)) as pilot:
+        await fitted(pilot)
+        await press(pilot, "n")
+        await until(pilot, lambda: "Heading before and after" in screen(pilot.app))
+        await press(pilot, "m")
+        session.change(current=24.0, compasses=(_at(24.0),))
+        await until(pilot, lambda: "24.0 A" in screen(pilot.app))
+        pair = pilot.app.screen._pairs[0]
+        assert abs(pair.moved_before) > 15.0
+        assert abs(pair.moved_after) < 0.1
+        assert pair.largest_before == pytest.approx(abs(pair.moved_before))
+
+
+async def test_after_writing_before_is_worked_out_from_the_backup(tmp_path):
+    session = disarmed()
+    session.change(current=24.0, compasses=(_at(24.0),))
+    async with scripted.app(tmp_path, session=session).run_test(size=(120, 40)) as pilot:
+        await fitted(pilot)
+        await press(pilot, "w", "y")
+        await until(pilot, lambda: pilot.app.work.kept)
+        unwritten = _at(24.0).heading_deg
+        session.change(compasses=(_at(24.0, written=True),))
+        await press(pilot, "n")
+        await until(pilot, lambda: "worked out from the backup" in screen(pilot.app))
+        pair = pilot.app.screen._pairs[0]
+        assert pair.before == pytest.approx(unwritten, abs=0.2)
+        assert pair.after == pytest.approx(315.0, abs=0.2)
+
+
+def _at(current: float, *, written: bool = False):
+    """Compass 1 looking north-west, level, as the vehicle reports it at a current."""
+    field = [150.0, 150.0, 430.0]
+    pushed = [f + (0.0 if written else current * k) for f, k in zip(field, made.INTERFERENCE)]
+    heading = math.degrees(math.atan2(-pushed[1], pushed[0])) % 360.0
+    return made.compass_now(1, field=tuple(map(float, pushed)), heading_deg=heading)
+
+
+# --- leaving ----------------------------------------------------------------------------------
+
+
+async def test_quitting_with_unwritten_results_asks(tmp_path):
+    async with scripted.app(tmp_path, session=disarmed()).run_test() as pilot:
+        await fitted(pilot)
+        await press(pilot, "q")
+        await until(pilot, lambda: "not written anywhere yet" in screen(pilot.app))
+        await press(pilot, "enter")
+        assert pilot.app.is_running
+        await press(pilot, "q")
+        await until(pilot, lambda: isinstance(pilot.app.screen, Confirm))
+        await pilot.press("y")
+        await until(pilot, lambda: not pilot.app.is_running)
+
+
+async def test_quitting_in_the_middle_of_a_write_puts_everything_back_first(tmp_path):
+    session = disarmed()
+    session.slow = True
+    before = dict(session.held)
+    async with scripted.app(tmp_path, session=session).run_test() as pilot:
+        await fitted(pilot)
+        await press(pilot, "w")
+        await until(pilot, lambda: isinstance(pilot.app.screen, Confirm))
+        await pilot.press("y")
+        await until(pilot, session.writing.is_set)
+        await pilot.press("q")
+        await until(pilot, lambda: "puts everything back" in screen(pilot.app))
+        await pilot.press("y")
+        await until(pilot, lambda: not pilot.app.is_running)
+    assert session.closed
+    assert session.held == before
+
+
+async def test_quitting_with_nothing_to_lose_does_not_ask_and_closes_the_link(tmp_path):
+    session = disarmed()
+    async with scripted.app(tmp_path, session=session).run_test() as pilot:
+        await connected(pilot)
+        await pilot.press("q")
+        await until(pilot, lambda: not pilot.app.is_running)
+    assert session.closed
