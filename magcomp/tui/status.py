@@ -8,7 +8,6 @@ from magcomp.session.snapshot import LiveSnapshot
 from magcomp.tui.widgets.top_bar import STEPS, Status
 from magcomp.tui.work import Work
 
-
 WRITING = "writing"
 """What is being done while a vehicle is written."""
 

@@ -1,4 +1,4 @@
-"""Work in hand that is made up, so that screens look the same for ever: no fit, no clock, no disk."""
+"""Work in hand that is made up, so that screens look the same for ever: no fit and no clock."""
 
 from __future__ import annotations
 

@@ -159,14 +159,15 @@ def app(
     )
 
 
-async def until(pilot: Any, true: Callable[[], object]) -> None:
-    """Let the app work until a condition holds."""
+async def until(pilot: Any, true: Callable[[], object], *, idle: bool = True) -> None:
+    """Let the app work until a condition holds, and then until there is nothing more to do."""
     deadline = time.monotonic() + PATIENCE_S
     while not true():
         if time.monotonic() > deadline:
             raise TimeoutError(f"the condition never held; the screen says:\n{picture(pilot.app)}")
         await pilot.pause(0.01)
-    await pilot.pause()
+    if idle:
+        await pilot.pause()
 
 
 async def press(pilot: Any, *keys: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import made
 import pytest
@@ -10,7 +11,7 @@ import scripted
 from scripted import ScriptedSession, press, screen, until
 
 from magcomp.errors import LinkTimeoutError, VehicleRefusedError, WriteError
-from magcomp.model import Grade
+from magcomp.model import Grade, ParameterChange, ParameterHistory
 from magcomp.parameters.files import read_parameter_file
 from magcomp.session.guide import Guidance, Situation
 from magcomp.tui import opening, writing
@@ -203,12 +204,10 @@ async def test_a_compass_left_out_whose_stored_vector_would_act_is_warned_of(tmp
     session = disarmed()
     async with scripted.app(tmp_path, session=session).run_test(size=(120, 40)) as pilot:
         work = await fitted(pilot)
-        stored = work.recording.parameters.changes + (
-            type(work.recording.parameters.changes[0])(1.0, "COMPASS_MOT2_X", 9.0),
-        )
-        history = type(work.recording.parameters)(stored)
-        recording = type(work.recording)(**{**vars(work.recording), "parameters": history})
-        pilot.app.set_work(type(work)(**{**vars(work), "recording": recording}))
+        stored = ParameterChange(1.0, "COMPASS_MOT2_X", 9.0)
+        history = ParameterHistory((*work.recording.parameters.changes, stored))
+        recording = replace(work.recording, parameters=history)
+        pilot.app.set_work(replace(work, recording=recording))
         await press(pilot, "2")
         await until(pilot, lambda: "its stored vector (9, 0, 0) will act" in screen(pilot.app))
 
@@ -305,7 +304,9 @@ async def test_after_writing_before_is_worked_out_from_the_backup(tmp_path):
 def _at(current: float, *, written: bool = False):
     """Compass 1 looking north-west, level, as the vehicle reports it at a current."""
     field = [150.0, 150.0, 430.0]
-    pushed = [f + (0.0 if written else current * k) for f, k in zip(field, made.INTERFERENCE)]
+    pushed = [
+        f + (0.0 if written else current * k) for f, k in zip(field, made.INTERFERENCE, strict=True)
+    ]
     heading = math.degrees(math.atan2(-pushed[1], pushed[0])) % 360.0
     return made.compass_now(1, field=tuple(map(float, pushed)), heading_deg=heading)
 

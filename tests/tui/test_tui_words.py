@@ -1,0 +1,131 @@
+"""Nothing is said by colour alone, and every number has its name."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import made
+import numpy as np
+import pytest
+import scripted
+from hypothesis import given
+from hypothesis import strategies as st
+from scripted import screen, until
+from textual.color import Color
+
+from magcomp.model import Grade, ParameterSet
+from magcomp.parameters.events import Mismatch, Outcome, Reason, RollingBack, Standing, Written
+from magcomp.tui.before_after import HeadingPair, HeadingWatch, heading_pairs
+from magcomp.tui.changes import after_event, change_rows
+from magcomp.tui.pictures import round_ticks
+from magcomp.tui.themes import SUN
+from magcomp.tui.widgets.bars import bar
+from magcomp.tui.work import Writing
+
+
+def test_importing_the_command_line_does_not_import_textual():
+    code = (
+        "import sys, magcomp.cli.app, magcomp.cli.tui\n"
+        "sys.exit(sum(name.startswith('textual') for name in sys.modules))"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_without_a_terminal_the_command_says_what_to_use():
+    command = [sys.executable, "-m", "magcomp", "tui"]
+    ended = subprocess.run(
+        command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False
+    )
+    assert ended.returncode == 2
+    assert "magcomp tui must run in a terminal" in ended.stderr
+    assert "Traceback" not in ended.stderr
+
+
+@pytest.mark.parametrize("grade", list(Grade))
+async def test_a_grade_is_a_word_and_a_sign_without_any_colour(tmp_path, monkeypatch, grade):
+    monkeypatch.setenv("NO_COLOR", "1")
+    app = scripted.app(tmp_path)
+    async with app.run_test() as pilot:
+        app.set_work(made.work(grade, Grade.GOOD))
+        app.action_go("fit")
+        await until(pilot, lambda: "Heading error" in screen(app))
+        sign = {"good": "●", "marginal": "◐", "rejected": "○"}[grade]
+        assert f"[1] {sign} {grade.upper()}" in screen(app)
+
+
+async def test_an_unhealthy_compass_has_a_sign_of_its_own(tmp_path):
+    session = scripted.ScriptedSession()
+    app = scripted.app(tmp_path, session=session)
+    async with app.run_test() as pilot:
+        app.session = session
+        app.set_work(made.work(live=True))
+        app.action_go("record")
+        await until(pilot, lambda: "Compasses" in screen(app))
+        await until(pilot, lambda: "! 3 481 mG" in screen(app))
+
+
+def test_in_sunlight_every_colour_stands_out_seven_to_one():
+    def luminance(name: str) -> float:
+        parts = [part / 255 for part in Color.parse(name).rgb]
+        linear = [p / 12.92 if p <= 0.03928 else ((p + 0.055) / 1.055) ** 2.4 for p in parts]
+        return float(np.dot(linear, (0.2126, 0.7152, 0.0722)))
+
+    paper = luminance(SUN.background)
+    inks = (SUN.foreground, SUN.primary, SUN.accent, SUN.success, SUN.warning, SUN.error)
+    for ink in (*inks, SUN.variables["quiet"]):
+        assert (paper + 0.05) / (luminance(ink) + 0.05) >= 7.0
+
+
+@given(share=st.floats(allow_nan=False), width=st.integers(0, 200))
+def test_a_bar_is_as_wide_as_it_should_be_whatever_it_shows(share, width):
+    assert bar(share, width).cell_length == width
+
+
+@given(
+    low=st.floats(-1e6, 1e6),
+    span=st.floats(1e-3, 1e6),
+    most=st.integers(2, 12),
+)
+def test_ticks_are_round_few_and_inside(low, span, most):
+    ticks = round_ticks(low, low + span, most)
+    assert len(ticks) <= most
+    for tick in ticks:
+        assert low - 1e-6 * span <= tick <= low + span * (1 + 1e-6)
+
+
+def test_only_what_differs_as_float32_is_a_change():
+    wanted = ParameterSet({"COMPASS_OFS_X": 12.1, "COMPASS_MOT_X": -1.5, "COMPASS_DIA_X": 1.0})
+    present = {"COMPASS_OFS_X": float(np.float32(12.1)), "COMPASS_MOT_X": 0.0}
+    rows = change_rows(present, wanted)
+    assert [(row.name, row.old, row.new) for row in rows] == [
+        ("COMPASS_MOT_X", "0", "-1.5"),
+        ("COMPASS_DIA_X", "?", "1"),
+    ]
+
+
+def test_each_row_tells_how_far_its_parameter_is():
+    rows = change_rows({}, ParameterSet({"COMPASS_MOT_X": 1.0, "COMPASS_MOT_Y": 2.0}))
+    rows = after_event(rows, Written("COMPASS_MOT_X", 1.0))
+    assert [row.state for row in rows] == ["written", ""]
+    rows = after_event(rows, Mismatch("COMPASS_MOT_Y", 2.0, 0.5))
+    assert [row.state for row in rows] == ["written", "holds 0.5"]
+    rows = after_event(rows, RollingBack(Reason.MISMATCH, ""))
+    assert {row.state for row in rows} == {"putting back"}
+    assert {row.state for row in after_event(rows, Outcome(Standing.NEW))} == {"✓ read back"}
+    failed = Outcome(Standing.OFF, Reason.LINK_LOST, "gone")
+    assert {row.state for row in after_event(rows, failed)} == {"not sure"}
+
+
+def test_a_heading_that_passes_north_has_moved_by_little():
+    watch = HeadingWatch()
+    watch.mark((HeadingPair(1, 359.0, 1.0),))
+    (pair,) = watch.look((HeadingPair(1, 3.0, 358.0),), 0.0)
+    assert (pair.moved_before, pair.moved_after) == (4.0, -3.0)
+    (pair,) = watch.look((HeadingPair(1, 359.0, 1.0),), 0.1)
+    assert (pair.moved_before, pair.largest_before, pair.largest_after) == (0.0, 4.0, 3.0)
+
+
+def test_without_current_nothing_is_invented():
+    live = made.snapshot(current=None)
+    assert all(pair.after is None for pair in heading_pairs(live, made.work(), Writing()))
