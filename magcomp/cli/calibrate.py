@@ -20,6 +20,7 @@ from magcomp.cli.linking import (
     any_vehicle_option,
     link_options,
     positive_seconds,
+    replayed,
     stop_on_interrupt,
     yes_option,
 )
@@ -143,7 +144,7 @@ def calibrate(
         if isinstance(parse_address(address, baud=link.baud), Replay):
             raise UsageError(f"--upload must be given with a vehicle; instead received {address}")
     record_to = record_to or new_file("recording", ".tlog", None, time.time())
-    check_output(record_to, (".tlog",), record_to, force=wishes.force)
+    check_output(record_to, (".tlog",), replayed(address), force=wishes.force)
     if wishes.output is not None:
         check_output(wishes.output, SUFFIXES, record_to, force=wishes.force)
     with LiveSession.open(

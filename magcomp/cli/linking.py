@@ -99,6 +99,11 @@ def positive_seconds(seconds: float | None) -> float | None:
     return seconds
 
 
+def replayed(address: str) -> Path:
+    """The log that an address names, if it names one: no output may replace it."""
+    return Path(address.rpartition(",")[0] or address)
+
+
 @contextlib.contextmanager
 def stop_on_interrupt() -> Iterator[threading.Event]:
     """Turn the first Ctrl-C, or a polite kill, into an event; the second one interrupts.

@@ -13,6 +13,7 @@ from magcomp.cli.linking import (
     address_argument,
     link_options,
     positive_seconds,
+    replayed,
     stop_on_interrupt,
 )
 from magcomp.cli.options import check_output
@@ -46,7 +47,7 @@ def record(
     arrived is in the file at once.
     """
     limit = positive_seconds(seconds) or math.inf
-    check_output(output, (".tlog",), output, force=force)
+    check_output(output, (".tlog",), replayed(address), force=force)
     status = StatusLine()
     with (
         stop_on_interrupt() as stop,

@@ -444,7 +444,10 @@ class LiveSession:
             if vehicle is None:
                 continue
             now = self._tap.latest.now(vehicle)
-            self._situation.update(self.elapsed_s, now.armed, now.attitude, now.height_m, now.speed)
+            # By the vehicle's clock: a replay, or a simulation, may be faster than ours.
+            self._situation.update(
+                self._tap.seconds, now.armed, now.attitude, now.height_m, now.speed
+            )
 
     def _take(self, event: LinkEvent) -> None:
         match event:
