@@ -104,7 +104,12 @@ def _away_from(time: FloatArray, moments: tuple[float, ...]) -> BoolArray:
 
 
 def _in_gap(time: FloatArray, known: FloatArray) -> BoolArray:
-    """Whether the neighbours in ``known`` stand too far apart to interpolate between."""
+    """Whether the neighbours in ``known`` stand too far apart to interpolate between.
+
+    One value alone is a constant: it holds everywhere.
+    """
+    if len(known) < 2:
+        return np.zeros(len(time), dtype=bool)
     after = np.clip(np.searchsorted(known, time), 1, len(known) - 1)
     width = known[after] - known[after - 1]
     limit = max(0.5, 2.5 * float(np.median(np.diff(known))))
