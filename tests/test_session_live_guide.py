@@ -151,6 +151,8 @@ def test_a_flight_ends_when_the_answer_is_good_and_no_longer_changes():
     assert "land and disarm" in guide(enough).text
     assert not guide(replace(enough, stable_refits=1)).enough
     assert not guide(replace(enough, grade=Grade.MARGINAL)).enough
+    assert not guide(replace(enough, bound_deg=0.9)).enough
+    assert guide(replace(enough, bound_deg=0.9, seconds=300.0)).enough
     assert guide(replace(enough, armed=False)).text == "that is enough"
 
 

@@ -21,6 +21,8 @@ from magcomp.link import read_signing_key
 
 _Result = TypeVar("_Result")
 
+_TEXT_WIDTH = 42
+
 HEARTBEAT_S = 10.0
 """How long the first heartbeat is waited for."""
 
@@ -154,7 +156,7 @@ class StatusLine:
             Numbers that change all the time; only a terminal shows them.
         """
         if self._terminal:
-            text = f"{passing}  {lasting}" if passing else lasting
+            text = f"{lasting:<{_TEXT_WIDTH}}  {passing}" if passing else lasting
             text = text[: max(_columns() - 1, 20)]
             _to_stderr(f"\r{text.ljust(self._width)}")
             self._width = len(text)

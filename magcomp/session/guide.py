@@ -57,6 +57,9 @@ _THROTTLE_SHARE_S = 2.0
 _HELD_LEVELS = (0, 2, 4, 3, 1, 5)
 _LOW_M = 8.0
 _STABLE_REFITS = 2
+FINE_DEG = 0.5
+LONG_S = 240.0
+"""A bound that is worth waiting for, and how long."""
 
 
 class Situation(StrEnum):
@@ -112,6 +115,8 @@ class View:
         Of the newest analysis; None before the first.
     stable_refits
         Analyses in a row that said the same.
+    bound_deg
+        Heading error that the newest analysis promises not to be exceeded (95 %), degrees.
     """
 
     situation: Situation
@@ -123,6 +128,7 @@ class View:
     seconds: float
     grade: Grade | None = None
     stable_refits: int = 0
+    bound_deg: float = 0.0
 
 
 class SituationWatch:
@@ -215,8 +221,9 @@ def guide(view: View) -> Guidance:
 
 
 def is_settled(view: View) -> bool:
-    """Whether the judge is content and has been for a while."""
-    return view.grade is Grade.GOOD and view.stable_refits >= _STABLE_REFITS
+    """Whether the judge is content and has been for a while, and more data would help little."""
+    steady = view.grade is Grade.GOOD and view.stable_refits >= _STABLE_REFITS
+    return steady and (view.bound_deg <= FINE_DEG or view.seconds >= LONG_S)
 
 
 def pilot_is_done(situation: Situation, disarmed_s: float, levels: int) -> bool:
@@ -268,7 +275,7 @@ def _guide_flight(view: View) -> Guidance:
         min(view.stable_refits / _STABLE_REFITS, 1.0) if view.grade is Grade.GOOD else 0.0,
     )
     share = float(np.mean(shares))
-    if min(shares) >= 1.0:
+    if min(shares) >= 1.0 and is_settled(view):
         return Guidance(_ending(view), 1.0, enough=True)
     if not view.armed:
         return Guidance("this flight was not enough: fly once more with turns and climbs", share)

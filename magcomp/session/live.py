@@ -7,6 +7,7 @@ A terminal interface draws ``snapshot()`` and calls the rest.
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -31,7 +32,7 @@ from magcomp.link import (
     connect,
 )
 from magcomp.link.clock import Clock, SystemClock
-from magcomp.model import Analysis, ParameterSet, Recording, Vehicle
+from magcomp.model import Analysis, Grade, ParameterSet, Recording, Vehicle
 from magcomp.parameters.events import Event, Outcome
 from magcomp.parameters.plan import WritePlan, relevant_names
 from magcomp.parameters.writer import fetch
@@ -483,6 +484,7 @@ class LiveSession:
             seconds=self._tap.seconds,
             grade=None if refit.analysis is None else refit.analysis.grade,
             stable_refits=refit.stable,
+            bound_deg=_bound_deg(refit.analysis),
         )
 
     def _guidance(self, vehicle: Vehicle | None, view: View) -> Guidance:
@@ -512,6 +514,17 @@ class LiveSession:
         if self._tap.failure:
             found.insert(0, self._tap.failure.rstrip("."))
         return tuple(found)
+
+
+def _bound_deg(analysis: Analysis | None) -> float:
+    """Largest heading error, 95 %, of the compasses that are not rejected."""
+    errors = [
+        error.p95
+        for result in (analysis.compasses if analysis else ())
+        if result.verdict.grade is not Grade.REJECTED
+        for error in result.verdict.heading_error
+    ]
+    return max(errors, default=math.inf)
 
 
 def _degrees(now: Now) -> tuple[float, float, float] | None:

@@ -24,7 +24,7 @@ from magcomp.parameters.reader import ReadProgress
 from magcomp.parameters.writer import read_current, write
 from magcomp.session.latest import Latest
 
-DISARM_S = 120.0
+DISARM_S = 300.0
 """How long a pilot gets to land and disarm."""
 
 _FRESH_US = 1_500_000
