@@ -7,9 +7,9 @@ A terminal interface draws ``snapshot()`` and calls the rest.
 
 from __future__ import annotations
 
+import contextlib
 import math
 import threading
-import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import TracebackType
@@ -34,8 +34,7 @@ from magcomp.link import (
 from magcomp.link.clock import Clock, SystemClock
 from magcomp.model import Analysis, Grade, ParameterSet, Recording, Vehicle
 from magcomp.parameters.events import Event, Outcome
-from magcomp.parameters.plan import WritePlan, relevant_names
-from magcomp.parameters.writer import fetch
+from magcomp.parameters.plan import WritePlan
 from magcomp.session.analyse import Options, Progress, analyse
 from magcomp.session.guide import (
     Guidance,
@@ -46,20 +45,13 @@ from magcomp.session.guide import (
     levels_done,
 )
 from magcomp.session.latest import Latest, Now
+from magcomp.session.prepare import Preparation
 from magcomp.session.refit import DEFAULT_SHARE, Refit, Refitter
 from magcomp.session.snapshot import LiveSnapshot, compasses_now, warnings
 from magcomp.session.tap import Tap
 from magcomp.session.upload import finish_restore, make_plan, read_backup, wait_disarmed, write_plan
 
 _LOOK_S = 0.2
-_STREAMS_S = 6.0
-_MOTOR_NAMES = (
-    *(f"MOT_{name}" for name in ("THST_EXPO", "SPIN_MIN", "SPIN_MAX", "PWM_MIN", "PWM_MAX")),
-    *("COMPASS_LEARN", "COMPASS_USE", "COMPASS_USE2", "COMPASS_USE3", "BATT_MONITOR"),
-)
-_OUTPUT_NAMES = tuple(f"SERVO{n}_FUNCTION" for n in range(1, 9))
-"""Nice to know, and not there on small boards: asking in vain takes seconds."""
-
 _NOTHING = Now(0, None, {}, (), None, None, None, None, None, None, False)
 
 
@@ -106,16 +98,12 @@ class LiveSession:
         self.connection = connection
         self._tap = tap
         self._clock = clock
-        self._rates = rates
         self._opened = clock.monotonic()
         self._asked = threading.Lock()
-        self._ready = threading.Event()
+        self._preparation = Preparation(connection, rates, clock)
         self._stop = threading.Event()
-        self._streaming_since: float | None = None
         self._situation = SituationWatch()
         self._notes: list[str] = []
-        self._trouble = ""
-        self._failure: MagcompError | None = None
         self._refits = (options, refit_share)
         self._refitter: Refitter | None = None
         self._threads = [
@@ -212,11 +200,11 @@ class LiveSession:
             Several vehicles and none chosen, or the link is lost for good.
         """
         vehicle = self.connection.wait_vehicle(timeout)
-        while not self._ready.wait(_LOOK_S):
+        while not self._preparation.over.wait(_LOOK_S):
             if self._stop.is_set():
                 raise LinkError(f"The connection to {self.connection.address} is closed.")
-        if self._failure is not None:
-            raise self._failure
+        if self._preparation.failure is not None:
+            raise self._preparation.failure
         return self.connection.vehicle or vehicle
 
     # ---------------------------------------------------------------- what is shown
@@ -257,7 +245,7 @@ class LiveSession:
             grade=view.grade,
             stable_refits=refit.stable,
             fit_trouble=refit.trouble,
-            ready=self._ready.is_set(),
+            ready=self._preparation.over.is_set(),
             ended=self.connection.ended,
         )
 
@@ -400,42 +388,15 @@ class LiveSession:
     # ---------------------------------------------------------------- the threads
 
     def _prepare(self) -> None:
-        """Find the vehicle, ask for its streams, read its calibration."""
-        try:
-            vehicle = self._wait_for_vehicle()
-            live = vehicle is not None and not isinstance(self.connection.address, Replay)
-            with self._asked:
-                if vehicle is not None and live:
-                    self.connection.request_streams(self._rates, _STREAMS_S)
-                    self._streaming_since = self._clock.monotonic()
-                    names = relevant_names(vehicle.autopilot, ParameterSet({}))
-                    self._read(vehicle, (*names, *_MOTOR_NAMES))
-                self._begin_refits()
-                self._ready.set()
-                if vehicle is not None and live:
-                    self._read(vehicle, _OUTPUT_NAMES)
-        except MagcompError as error:
-            if not self._ready.is_set():
-                self._failure = error
-            self._trouble = str(error)
-        self._ready.set()
+        with contextlib.ExitStack() as held:
+            self._preparation.run(
+                self._stop, before_asking=lambda: held.enter_context(self._asked), then=self._begin
+            )
 
-    def _begin_refits(self) -> None:
+    def _begin(self) -> None:
         options, share = self._refits
         if share and not self._stop.is_set():
             self._refitter = Refitter(self.recording, options, share=share)
-
-    def _wait_for_vehicle(self) -> Vehicle | None:
-        while not self._stop.is_set() and not self.connection.ended:
-            try:
-                return self.connection.wait_vehicle(1.0)
-            except LinkTimeoutError as error:
-                self._trouble = str(error)
-        return None
-
-    def _read(self, vehicle: Vehicle, names: tuple[str, ...]) -> None:
-        self.connection.discard()
-        fetch(self.connection, vehicle, names, clock=time.monotonic)
 
     def _watch(self) -> None:
         while not self._stop.wait(_LOOK_S):
@@ -459,7 +420,7 @@ class LiveSession:
             case VehicleRebooted():
                 self._note("the vehicle rebooted")
             case VehicleFound():
-                self._trouble = ""
+                self._preparation.trouble = ""
 
     def _note(self, text: str) -> None:
         self._notes = [*self._notes[-4:], text]
@@ -490,27 +451,27 @@ class LiveSession:
     def _guidance(self, vehicle: Vehicle | None, view: View) -> Guidance:
         if vehicle is None:
             return Guidance("waiting for the vehicle's heartbeat", 0.0)
-        if not self._ready.is_set():
+        if not self._preparation.over.is_set():
             return Guidance("reading the vehicle's calibration", 0.0)
         return guide(view)
 
     def _link_text(self, vehicle: Vehicle | None, up: bool) -> str:
         if vehicle is None:
-            return self._trouble or "waiting for a heartbeat"
+            return self._preparation.trouble or "waiting for a heartbeat"
         if not up:
             return "the link is lost; trying again"
-        return self._trouble or "connected"
+        return self._preparation.trouble or "connected"
 
     def _warnings(
         self, now: Now, vehicle: Vehicle | None, parameters: Mapping[str, float]
     ) -> tuple[str, ...]:
         if vehicle is None:
             return ()
-        since = self._streaming_since
+        since = self._preparation.streaming_since
         streaming = 0.0 if since is None else self._clock.monotonic() - since
         found = [*warnings(now, vehicle, parameters, streaming), *reversed(self._notes)]
-        if self._failure is not None:
-            found.insert(0, str(self._failure).rstrip("."))
+        if self._preparation.failure is not None:
+            found.insert(0, str(self._preparation.failure).rstrip("."))
         if self._tap.failure:
             found.insert(0, self._tap.failure.rstrip("."))
         return tuple(found)
