@@ -267,7 +267,7 @@ class MagcompApp(App[None]):
         """Hide the keys that have nothing to do on this road."""
         road, work = status.road(self.work), self.work
         shown = {
-            "forward": self.current_mode != road[-1],
+            "forward": bool(work.source) and self.current_mode != road[-1],
             "backward": self.current_mode != road[0],
             "disconnect": bool(work.source),
             "open_log": not work.source,

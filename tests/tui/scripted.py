@@ -170,6 +170,14 @@ async def until(pilot: Any, true: Callable[[], object], *, idle: bool = True) ->
         await pilot.pause()
 
 
+async def steady(pilot: Any) -> None:
+    """Let the app work until the screen stays as it is."""
+    seen: list[str] = []
+    while len(seen) < 4 or len(set(seen[-4:])) > 1:
+        await pilot.pause()
+        seen.append(picture(pilot.app))
+
+
 async def press(pilot: Any, *keys: str) -> None:
     """Press keys, and let the app finish what they started."""
     for key in keys:

@@ -116,7 +116,7 @@ async def test_every_action_with_a_key_can_be_given_another(tmp_path):
         await until(pilot, lambda: "Heading error" in screen(app))
         assert "f7 View" in screen(app)
         await press(pilot, "f7")
-        await until(pilot, lambda: "Motors add" in screen(app))
+        await until(pilot, lambda: "Field the motors add" in screen(app))
 
 
 async def test_the_theme_chosen_is_there_the_next_time(tmp_path):
@@ -149,7 +149,7 @@ async def test_the_palette_has_every_step_and_every_deed(tmp_path):
 async def test_a_step_that_cannot_be_taken_says_what_is_missing(tmp_path):
     app = scripted.app(tmp_path)
     async with app.run_test(notifications=True) as pilot:
-        await press(pilot, "n")
+        app.action_go("record")
         assert app.current_mode == "connect"
         await until(pilot, lambda: app.screen.query("Toast"))
         (toast,) = app.screen.query("Toast")

@@ -133,7 +133,7 @@ async def test_a_lost_link_is_shown_in_words_and_recovered_from_on_the_same_scre
         await until(pilot, lambda: "link good" in screen(pilot.app))
         session.change(connected=False)
         await until(pilot, lambda: "LINK LOST" in screen(pilot.app))
-        assert "it goes on by itself when it is back" in screen(pilot.app)
+        assert "it goes on when the link is back" in screen(pilot.app)
         session.change(connected=True)
         await until(pilot, lambda: "link good" in screen(pilot.app))
         assert pilot.app.current_mode == "record"
@@ -309,6 +309,32 @@ def _at(current: float, *, written: bool = False):
     ]
     heading = math.degrees(math.atan2(-pushed[1], pushed[0])) % 360.0
     return made.compass_now(1, field=tuple(map(float, pushed)), heading_deg=heading)
+
+
+# --- the unforeseen ---------------------------------------------------------------------------
+
+
+async def test_even_a_mistake_of_ours_ends_in_a_sentence_and_not_in_a_traceback(
+    tmp_path, monkeypatch, capsys
+):
+    def mistaken(screen) -> None:
+        raise ZeroDivisionError("division by zero")
+
+    app = scripted.app(tmp_path)
+
+    async def go_wrong() -> None:
+        async with app.run_test() as pilot:
+            await until(pilot, lambda: app.choices)
+            monkeypatch.setattr(type(app.screen), "draw", mistaken)
+            app.call_later(app.redraw)
+            await until(pilot, lambda: not app.is_running)
+
+    with pytest.raises(ZeroDivisionError):
+        await go_wrong()
+    said = capsys.readouterr().err
+    assert "This should not have happened: ZeroDivisionError: division by zero." in said
+    assert "Traceback" not in said
+    assert app.return_code == 1
 
 
 # --- leaving ----------------------------------------------------------------------------------

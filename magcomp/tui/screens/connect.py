@@ -91,8 +91,8 @@ def choice_text(choice: Choice, *, roomy: bool) -> Content:
     if len(target) > _TARGET_CELLS:
         target = f"…{target[1 - _TARGET_CELLS :]}"
     if roomy:
-        return Content.assemble((target, "bold"), "\n", (choice.note, "$quiet"))
-    return Content.assemble(f"{target:<{_TARGET_CELLS}}  ", (choice.note, "$quiet"))
+        return Content.assemble((target, "bold"), "\n", f"  {choice.note}")
+    return Content.assemble((f"{target:<{_TARGET_CELLS}}  ", "bold"), choice.note)
 
 
 class ConnectScreen(StepScreen):

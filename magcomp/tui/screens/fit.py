@@ -13,11 +13,11 @@ from textual.widget import Widget
 from textual.widgets import ProgressBar, Static
 
 from magcomp.fit import METHODS
-from magcomp.model import Analysis, Grade
+from magcomp.model import CURRENT, Analysis, Grade
 from magcomp.report import words
 from magcomp.session import Options
 from magcomp.tui import fitting
-from magcomp.tui.pictures import AXES, AXIS_WORDS, CompassPicture
+from magcomp.tui.pictures import AXES, CompassPicture
 from magcomp.tui.screens.step import StepScreen
 from magcomp.tui.widgets.heading_table import HeadingTable
 from magcomp.tui.widgets.plots import ShiftPlot, UnexplainedPlot
@@ -25,7 +25,7 @@ from magcomp.tui.widgets.verdict_text import VerdictText, grade_word
 
 VIEWS = {
     "heading": "Heading error",
-    "shift": "What the motors add",
+    "shift": "Field the motors add, mGauss",
     "unexplained": "Unexplained field, mGauss",
     "verdict": "Verdict",
 }
@@ -128,12 +128,10 @@ and C change method, regressor, time range and compasses, and fit again at once.
             f"unseen {residual.held_out:.1f}"
         )
         self.query_one("#view-unexplained").border_subtitle = "x now   • corrected"
-        axes = zip(AXES, AXIS_WORDS, shown.result.fit.interference, strict=True)
-        self.query_one("#view-shift").border_subtitle = "   ".join(
-            f"{axis} {name} {words.number(float(value))}" for axis, name, value in axes
-        )
-        title = words.interference_title(shown.result.fit.regressor)
-        self.query_one("#view-shift").border_title = f"{title[:1].upper()}{title[1:]}"
+        axes = zip(AXES, shown.result.fit.interference, strict=True)
+        each = "  ".join(f"{axis} {words.number(float(value))}" for axis, value in axes)
+        per = "per A" if shown.result.fit.regressor == CURRENT else "at full"
+        self.query_one("#view-shift").border_subtitle = f"{each}  {per}"
 
     def _key(self, name: str) -> str:
         """The key of an action as it is displayed; the settings may have changed it."""

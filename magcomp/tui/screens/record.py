@@ -99,7 +99,7 @@ is enough, press N. You can fit at any time and come back: the recording goes on
 def next_sentence(live: LiveSnapshot) -> str:
     """What to do next; a lost link comes before everything."""
     if not live.connected:
-        return "The link is lost: keep this screen open, it goes on by itself when it is back."
+        return "The link is lost: stay here, it goes on when the link is back."
     if live.guidance.enough:
         return f"{words.sentence(live.guidance.text)} Then press N."
     return words.sentence(live.guidance.text)

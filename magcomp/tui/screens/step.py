@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
 from typing import TYPE_CHECKING, ClassVar, cast
 
 from textual.app import ComposeResult
+from textual.css.query import NoMatches
 from textual.screen import Screen
 from textual.widget import Widget
 from textual.widgets import Footer
@@ -60,14 +62,20 @@ class StepScreen(Screen[None]):
 
     def redraw(self) -> None:
         """Draw, if this screen is there to be drawn on."""
-        if self.is_mounted and self.is_attached:
+        if not (self.is_mounted and self.is_attached):
+            return
+        # While the app closes, the parts of a screen go before the screen does.
+        with suppress(NoMatches):
             self.query_one(TopBar).show(self.magcomp.steps_done, self.magcomp.status)
             self.draw()
-            # The footer is built anew with the bindings: only where they may differ.
-            bindings = self.magcomp.binding_state
-            if bindings != self._bindings_drawn:
-                self._bindings_drawn = bindings
-                self.refresh_bindings()
+        self._show_keys()
+
+    def _show_keys(self) -> None:
+        """Build the footer anew, but only where the keys may differ: it is not cheap."""
+        bindings = self.magcomp.binding_state
+        if bindings != self._bindings_drawn:
+            self._bindings_drawn = bindings
+            self.refresh_bindings()
 
     def on_screen_resume(self) -> None:
         """Draw what changed meanwhile."""

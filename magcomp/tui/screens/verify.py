@@ -91,12 +91,16 @@ class VerifyScreen(StepScreen):
     def _next(self) -> str:
         live = self.magcomp.live
         if live is not None and not live.connected:
-            return "The link is lost: this screen goes on by itself when it is back."
-        if live is not None and live.situation is Situation.FLYING:
+            return "The link is lost: stay here, it goes on when the link is back."
+        if live is not None and live.armed and live.situation is Situation.FLYING:
             return "Hold a heading, climb and descend: “takes out” grows with the throttle."
         if not self._watch.marked:
-            return "Hold the vehicle still, press M, then raise the throttle and watch “moved”."
-        return "Change the throttle: “before” moves, “corrected” stays. Q ends."
+            return "Tie it down, press M, then run the motors: watch “moved”."
+        return "With the motors “before” moves, “corrected” stays. Q ends."
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:  # noqa: ARG002
+        """Hide the choice of a plot where there is no room for one."""
+        return action != "compass" or self.has_class("-tall")
 
     def action_compass(self, compass: int) -> None:
         """Plot another compass."""

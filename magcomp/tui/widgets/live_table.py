@@ -11,6 +11,7 @@ from magcomp.tui.widgets.verdict_text import grade_word
 
 _POINTS = ("N", "NE", "E", "SE", "S", "SW", "W", "NW")
 _FULL_MGAUSS = 900.0
+_SCALES_A = (20.0, 50.0, 100.0, 200.0, 500.0)
 
 
 class LiveTable(Static):
@@ -65,20 +66,25 @@ moves with one of them.
     def __init__(self, *, id: str | None = None) -> None:  # noqa: A002 - Textual's own name
         super().__init__(id=id)
         self._text = ""
-        self._most = 20.0
+        self._most = _SCALES_A[0]
 
     def show(self, live: LiveSnapshot) -> None:
-        """Draw; the current's bar is as long as the largest current so far."""
-        self._most = max(self._most, live.current or 0.0)
-        width = max(self.size.width - 22, 8)
+        """Draw; the full length of the current's bar grows with the largest current so far."""
+        current = live.current or 0.0
+        fits = (scale for scale in _SCALES_A if scale >= max(current, self._most))
+        self._most = next(fits, _SCALES_A[-1])
+        width = max(self.size.width - 31, 8)
         throttle = live.throttle or 0.0
         lines = [
-            _control("throttle", live.throttle, f"{100 * throttle:3.0f} %", throttle, width),
+            _control(
+                "throttle", live.throttle, f"{100 * throttle:3.0f} %", throttle, "100 %", width
+            ),
             _control(
                 "current",
                 live.current,
-                f"{live.current or 0.0:5.1f} A",
-                (live.current or 0.0) / self._most,
+                f"{current:5.1f} A",
+                current / self._most,
+                f"{self._most:.0f} A",
                 width,
             ),
         ]
@@ -88,11 +94,16 @@ moves with one of them.
             self.update(content, layout=False)
 
 
-def _control(name: str, value: float | None, text: str, share: float, width: int) -> Content:
+def _control(
+    name: str, value: float | None, text: str, share: float, full: str, width: int
+) -> Content:
     if value is None:
         return Content.assemble((f"  {name:<9}", "$quiet"), "  not known")
     return Content.assemble(
-        (f"  {name:<9}", "$quiet"), f"{text:>8} ", bar(share, width, style="$accent")
+        (f"  {name:<9}", "$quiet"),
+        f"{text:>8} ",
+        bar(share, width, style="$accent"),
+        (f" {full:>6}", "$quiet"),
     )
 
 

@@ -1,0 +1,39 @@
+"""How every screen looks at 80×24 and 120×40.
+
+The words are compared always. The pictures, with colours, are compared where Textual is the one
+they were made with: another release may draw a border differently and be right. Both are made
+anew by ``pytest tests/tui/test_tui_screens.py --snapshot-update``.
+"""
+
+from __future__ import annotations
+
+import pytest
+import scripted
+import staged
+from syrupy.extensions.single_file import SingleFileSnapshotExtension, WriteMode
+from textual import __version__ as textual_version
+
+MADE_WITH = "8.2.8"
+
+
+class Words(SingleFileSnapshotExtension):
+    file_extension = "txt"
+    _file_extension = "txt"
+    _write_mode = WriteMode.TEXT
+
+
+@pytest.mark.parametrize("size", staged.SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
+@pytest.mark.parametrize("stage", staged.STAGES, ids=lambda stage: stage.__name__)
+def test_screen(stage, size, tmp_path, snapshot, snap_compare):
+    shown = []
+
+    async def look(pilot) -> None:
+        await stage(pilot)
+        await scripted.steady(pilot)
+        shown.append(scripted.picture(pilot.app))
+
+    same = snap_compare(staged.app(tmp_path), terminal_size=size, run_before=look)
+    assert shown[0] == snapshot(extension_class=Words)
+    assert len(shown[0].splitlines()) <= size[1]
+    assert max(map(len, shown[0].splitlines())) <= size[0]
+    assert same or textual_version != MADE_WITH
