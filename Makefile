@@ -3,12 +3,16 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 
-.PHONY: demo test check lint benchmark clean
+.PHONY: demo test test-all check lint benchmark clean
 
 demo: $(VENV)/installed
 	@$(BIN)/magcomp demo
 
+# All but what waits in real time for tens of seconds; `make test-all` has that too.
 test: $(VENV)/installed-dev lint
+	@$(BIN)/python -m pytest -n 2 -q -m "not slow"
+
+test-all: $(VENV)/installed-dev lint
 	@$(BIN)/python -m pytest -n 2 -q
 
 lint: $(VENV)/installed-dev
@@ -20,7 +24,10 @@ lint: $(VENV)/installed-dev
 check: lint
 
 benchmark: $(VENV)/installed-dev
+	@$(BIN)/python benchmarks/accuracy.py
+	@$(BIN)/python benchmarks/coverage.py --seeds 3
 	@$(BIN)/python benchmarks/read_tlog.py
+	@$(BIN)/python benchmarks/fit_time.py
 
 $(VENV)/bin/python:
 	@$(PYTHON) -c 'import sys; sys.exit("magcomp needs Python 3.11 or newer") if sys.version_info < (3, 11) else None'
