@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,9 @@ import click
 import numpy as np
 
 from magcomp import __version__
-from magcomp.cli.options import Selection, json_option, log_argument, selection_options
+from magcomp.cli.heading_live import Following, follow, is_live
+from magcomp.cli.linking import LinkOptions, positive_seconds, reach_options
+from magcomp.cli.options import Selection, selection_options
 from magcomp.cli.output import answer, complain, look
 from magcomp.cli.work import fit_log, present_parameters
 from magcomp.compensate import Gravity, Track, from_parameters, track
@@ -29,6 +32,7 @@ _NAMES = ("raw", "corrected", "fused")
 _SIGNS = (".", "+", "•")
 _COLOURS = ("red", "blue", "green")
 _ROWS = 16
+_WHOLE = (-math.inf, math.inf)
 _PLOT_LINES = 18
 
 
@@ -63,7 +67,7 @@ class _Answer:
 
 
 @click.command("heading")
-@log_argument
+@click.argument("source", metavar="LOG|ADDRESS")
 @click.option(
     "--parameters",
     type=click.Path(path_type=Path),
@@ -79,26 +83,42 @@ class _Answer:
     help="Where the fusion takes the direction of gravity from.",
 )
 @selection_options
-@json_option
+@reach_options
+@click.option("--seconds", type=float, metavar="S", help="End a live one then; else by Ctrl-C.")
+@click.option("--json", "to_json", is_flag=True, help="Print JSON: one object, live one a line.")
 @click.option("--plot", is_flag=True, help="Draw the headings in the terminal.")
 def heading(
-    log: Path,
+    source: str,
     parameters: Path | None,
     in_force: bool,
     gravity: Gravity,
     selection: Selection,
+    link: LinkOptions,
+    seconds: float | None,
     to_json: bool,
     plot: bool,
 ) -> ExitCode:
-    """Show the heading through LOG: raw, corrected, and fused with the gyro.
+    """Show the heading through LOG, or of the vehicle at ADDRESS: raw, corrected, fused.
 
     Raw is the field as the autopilot reported it. The correction comes from a fit of LOG itself
     unless --parameters or --in-force says otherwise. In a simulation's log, whose truth is known,
-    the error of each is shown.
+    the error of each is shown. A live vehicle is corrected by what it holds, or --parameters.
     """
     if parameters is not None and in_force:
         raise UsageError("Either --parameters or --in-force must be given; instead received both")
     compass = 1 if selection.compass is None else selection.compass
+    if is_live(source):
+        if plot or gravity != "attitude" or (selection.start, selection.end) != _WHOLE:
+            raise UsageError(
+                f"--plot, --gravity, --start and --end must come with a log; instead received "
+                f"one with {source}"
+            )
+        chosen = {} if parameters is None else _chosen(parameters)
+        wanted = Following(compass, chosen, positive_seconds(seconds) or math.inf, to_json)
+        return follow(source, replace(link, system=selection.system), wanted)
+    if seconds is not None:
+        raise UsageError("--seconds must come with a live vehicle; instead received it with a log")
+    log = Path(source)
     recording, correction, origin = _correction(log, compass, parameters, in_force, selection)
     made = track(
         recording,
@@ -139,12 +159,17 @@ def _correction(
     values = present_parameters(recording)
     if parameters is None:
         return recording, from_parameters(values, compass), "the log's own parameters"
+    chosen = _chosen(parameters)
+    return recording, from_parameters({**values, **chosen}, compass), str(parameters)
+
+
+def _chosen(parameters: Path) -> Mapping[str, float]:
     chosen = read_parameter_file(parameters).values
     if not any(name.startswith("COMPASS_") for name in chosen):
         raise ParameterFileError(
             f"{parameters} must hold COMPASS_ parameters; instead it holds none"
         )
-    return recording, from_parameters({**values, **chosen}, compass), str(parameters)
+    return chosen
 
 
 def _truth(log: Path, selection: Selection) -> Truth | None:

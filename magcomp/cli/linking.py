@@ -9,7 +9,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -59,6 +59,17 @@ def link_options(command: Callable[..., _Result]) -> Callable[..., _Result]:
     """Give a command --system, --baud, --signing-key and --timeout as one ``LinkOptions``."""
 
     @click.option("--system", type=click.IntRange(1, 255), help="MAVLink system of the vehicle.")
+    @reach_options
+    @functools.wraps(command)
+    def with_link(system: int | None, link: LinkOptions, **others: object) -> _Result:
+        return command(link=replace(link, system=system), **others)
+
+    return with_link
+
+
+def reach_options(command: Callable[..., _Result]) -> Callable[..., _Result]:
+    """Give --baud, --signing-key and --timeout to a command that has a --system of its own."""
+
     @click.option("--baud", type=int, metavar="N", help="Speed of a serial port.")
     @click.option(
         "--signing-key",
@@ -75,17 +86,13 @@ def link_options(command: Callable[..., _Result]) -> Callable[..., _Result]:
         help="How long to wait for the vehicle.",
     )
     @functools.wraps(command)
-    def with_link(
-        system: int | None,
-        baud: int | None,
-        signing_key: Path | None,
-        timeout: float,
-        **others: object,
+    def with_reach(
+        baud: int | None, signing_key: Path | None, timeout: float, **others: object
     ) -> _Result:
         key = None if signing_key is None else read_signing_key(signing_key)
-        return command(link=LinkOptions(system, baud, key, timeout), **others)
+        return command(link=LinkOptions(None, baud, key, timeout), **others)
 
-    return with_link
+    return with_reach
 
 
 def positive_seconds(seconds: float | None) -> float | None:

@@ -81,7 +81,7 @@ class Latest:
                 return
             self._frames.setdefault(source, {})[message] = (unix_us, frame)
             if message == Message.PARAM_VALUE:
-                row = _row(frame, message)
+                row = decoded(frame, message)
                 name = text(np.array([row["param_id"]]))[0]
                 self._parameters.setdefault(source, {})[name] = float(row["param_value"])
 
@@ -108,7 +108,7 @@ class Latest:
             kept = dict(self._frames.get((vehicle.system, vehicle.component), {}))
         newest = max((stamp for stamp, _ in kept.values()), default=0)
         rows = {
-            message: _row(frame, message)
+            message: decoded(frame, message)
             for message, (stamp, frame) in kept.items()
             if message in (Message.HEARTBEAT, Message.SYS_STATUS) or newest - stamp < _STALE_US
         }
@@ -142,10 +142,11 @@ class Latest:
 
 def _is_of_interest(message: int, frame: bytes) -> bool:
     """Leave out second batteries: the compensation multiplies by the first."""
-    return message != Message.BATTERY_STATUS or int(_row(frame, message)["id"]) == 0
+    return message != Message.BATTERY_STATUS or int(decoded(frame, message)["id"]) == 0
 
 
-def _row(frame: bytes, message: int) -> Any:
+def decoded(frame: bytes, message: int) -> Any:
+    """One frame's fields, by the names of its message."""
     fields = layout(message)
     header = 6 if frame[0] == 0xFE else 10
     payload = frame[header : header + frame[1]][: fields.itemsize].ljust(fields.itemsize, b"\0")

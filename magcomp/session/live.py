@@ -22,6 +22,7 @@ from magcomp.errors import LinkError, LinkTimeoutError, MagcompError
 from magcomp.link import (
     DEFAULT_RATES,
     Connection,
+    FrameSink,
     GapEnded,
     GapStarted,
     LinkEvent,
@@ -303,6 +304,10 @@ class LiveSession:
             There is too little for a fit.
         """
         return analyse(self.recording(), options, progress)
+
+    def listen(self, sink: FrameSink) -> None:
+        """Give a sink every frame from now on, in the link's thread."""
+        self._tap.listen(sink)
 
     def stop_recording(self) -> None:
         """Take no more frames into buffer and file; the file is closed. The link stays."""

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from magcomp.buffer import Buffer
 from magcomp.errors import OutputError
-from magcomp.link import Recorder
+from magcomp.link import FrameSink, Recorder
 from magcomp.session.latest import Latest
 
 _STAMP_SIZE = 8
@@ -38,6 +38,7 @@ class Tap:
         self.buffer = buffer
         self.latest = latest
         self._recorder = recorder
+        self._listeners: tuple[FrameSink, ...] = ()
         self._lock = threading.Lock()
         self._taking = True
         self.failure = ""
@@ -68,6 +69,8 @@ class Tap:
     def add(self, unix_us: int, frame: bytes) -> None:
         """Take one whole frame that arrived at ``unix_us``."""
         self.latest.add(unix_us, frame)
+        for listener in self._listeners:
+            listener.add(unix_us, frame)
         with self._lock:
             if not self._taking:
                 return
@@ -75,6 +78,10 @@ class Tap:
             self._count(frame)
             if self._recorder is not None and not self.failure:
                 self._write(self._recorder, unix_us, frame)
+
+    def listen(self, sink: FrameSink) -> None:
+        """Give a sink, which must not fail, every frame from now on."""
+        self._listeners = (*self._listeners, sink)
 
     def stop(self) -> None:
         """Take no more frames into buffer and file, and close the file."""
