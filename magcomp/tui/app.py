@@ -358,8 +358,10 @@ class MagcompApp(App[None]):
         yield SystemCommand("Light or dark", "For sun or workshop", self.action_light)
         yield SystemCommand("Edit settings", "Where the settings file is", self.action_settings)
         yield SystemCommand("Help", "For what has the focus", self.action_help)
-        named = {"Theme", "Screenshot", "Quit"}
-        yield from (c for c in super().get_system_commands(screen) if c.title in named)
+        kept = ("theme", "screenshot")
+        others = super().get_system_commands(screen)
+        yield from (c for c in others if any(word in c.title.lower() for word in kept))
+        yield SystemCommand("Quit", "Asks where results would be lost", self.action_quit)
 
     def action_settings(self) -> None:
         """Make a settings file if there is none, and say where it is."""

@@ -142,8 +142,9 @@ async def test_the_palette_has_every_step_and_every_deed(tmp_path):
     app = scripted.app(tmp_path)
     async with app.run_test():
         titles = {command.title for command in app.get_system_commands(app.screen)}
-        for deed in ("Open a log", "Go to Verify", "Write to vehicle", "Undo writing", "Theme"):
+        for deed in ("Open a log", "Go to Verify", "Write to vehicle", "Undo writing", "Quit"):
             assert deed in titles
+        assert any("theme" in title.lower() for title in titles)
 
 
 async def test_a_step_that_cannot_be_taken_says_what_is_missing(tmp_path):
@@ -154,3 +155,12 @@ async def test_a_step_that_cannot_be_taken_says_what_is_missing(tmp_path):
         await until(pilot, lambda: app.screen.query("Toast"))
         (toast,) = app.screen.query("Toast")
         assert "Connect to a vehicle or open a log first." in str(toast.render())
+
+
+async def test_a_key_in_the_bottom_line_can_be_clicked(tmp_path):
+    app = scripted.app(tmp_path)
+    async with app.run_test() as pilot:
+        await until(pilot, lambda: "l Light" in screen(app))
+        column = scripted.picture(app).splitlines()[-1].index("Light")
+        await pilot.click(offset=(column, 23))
+        await until(pilot, lambda: app.theme == "sun")

@@ -10,8 +10,8 @@ from textual.app import ComposeResult
 from textual.css.query import NoMatches
 from textual.screen import Screen
 from textual.widget import Widget
-from textual.widgets import Footer
 
+from magcomp.tui.widgets.key_bar import KeyBar
 from magcomp.tui.widgets.next_line import NextLine
 from magcomp.tui.widgets.top_bar import TopBar
 
@@ -41,7 +41,7 @@ class StepScreen(Screen[None]):
         yield TopBar(self.STEP)
         yield from self.body()
         yield NextLine()
-        yield Footer(show_command_palette=False)
+        yield KeyBar()
 
     def body(self) -> Iterable[Widget]:
         """What stands between the top bar and the next line."""
@@ -71,7 +71,7 @@ class StepScreen(Screen[None]):
         self._show_keys()
 
     def _show_keys(self) -> None:
-        """Build the footer anew, but only where the keys may differ: it is not cheap."""
+        """Look for the keys anew, but only where they may differ: it is not cheap."""
         bindings = self.magcomp.binding_state
         if bindings != self._bindings_drawn:
             self._bindings_drawn = bindings
