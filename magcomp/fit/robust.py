@@ -191,7 +191,12 @@ def _descend(
         while damping < _DAMPING_MOST:
             damped = hessian + damping * np.diag(np.diag(hessian) + 1e-12)
             step = np.zeros_like(parameters)
-            step[moving] = -np.linalg.solve(damped, gradient)
+            try:
+                step[moving] = -np.linalg.solve(damped, gradient)
+            except np.linalg.LinAlgError:
+                # Readings of one attitude and one control quantity leave a direction undetermined.
+                damping *= 10.0
+                continue
             if -float(gradient @ step[moving]) < _NEGLIGIBLE:
                 break
             trial = parameters + step
@@ -223,7 +228,7 @@ def _covariance(
     flat = design.reshape(-1, size)
     data = flat.T @ (flat * weights.reshape(-1, 1))
     precision = np.diag(prior.precision[moving])
-    bread = np.linalg.inv(data + precision + 1e-12 * np.eye(size))
+    bread = np.linalg.pinv(data + precision + 1e-12 * np.eye(size), hermitian=True)
     scores = np.einsum("ngi,ng,ng->ni", design, weights, values, optimize=True)
     starts = np.flatnonzero(np.r_[True, np.diff(blocks) != 0])
     per_block = np.add.reduceat(scores, starts, axis=0)
