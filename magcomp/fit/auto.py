@@ -131,15 +131,9 @@ def refit(problem: Problem, fit: MotorFit, keep: BoolArray) -> MotorFit:
 
 def _with_lags(problem: Problem, fit: MotorFit) -> MotorFit:
     lags, std = estimate_lags(problem, fit.correction)
-    vertical = np.einsum("ij,ij->i", *_corrected_and_down(problem, fit, lags))
-    return replace(fit, lags=lags, lags_std=std, vertical=float(np.median(vertical)))
-
-
-def _corrected_and_down(
-    problem: Problem, fit: MotorFit, lags: Lags
-) -> tuple[FloatArray, FloatArray]:
-    samples = problem.sample(lags)
-    return fit.correction.apply(samples.raw, samples.u), samples.down
+    rows = problem.sample(lags)
+    vertical = np.median(residuals(rows, fit.correction, 0.0, 0.0)[:, 1])
+    return replace(fit, lags=lags, lags_std=std, vertical=float(vertical))
 
 
 def fit_flight(problem: Problem) -> MotorFit:

@@ -9,22 +9,9 @@ from dataclasses import dataclass
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from magcomp.link.framing import Message
+from magcomp.log.vehicles import AUTOPILOTS, KINDS
 from magcomp.model import Vehicle
 
-AUTOPILOTS = {
-    mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA: "ardupilot",
-    mavlink.MAV_AUTOPILOT_PX4: "px4",
-}
-"""The autopilots magcomp knows, by HEARTBEAT.autopilot."""
-
-_KINDS = {
-    "copter": (2, 3, 4, 13, 14, 15, 29, 35),
-    "plane": (1, 19, 20, 21, 22, 23, 24, 25),
-    "rover": (10,),
-    "boat": (11,),
-    "sub": (12,),
-}
-_KIND_OF_TYPE = {number: kind for kind, numbers in _KINDS.items() for number in numbers}
 _DEVICE_ID_NAMES = {
     "ardupilot": ("COMPASS_DEV_ID", "COMPASS_DEV_ID2", "COMPASS_DEV_ID3"),
     "px4": ("CAL_MAG0_ID", "CAL_MAG1_ID", "CAL_MAG2_ID"),
@@ -63,7 +50,7 @@ def read_heartbeat(message: Message) -> Heartbeat | None:
         message.get_srcSystem(),
         message.get_srcComponent(),
         autopilot,
-        _KIND_OF_TYPE.get(message.type, "unknown"),
+        KINDS.get(message.type, "unknown"),
     )
 
 

@@ -14,15 +14,16 @@ from magcomp.model import FloatArray
 
 _ARDUPILOT = 3
 _PX4 = 12
-_AUTOPILOTS = {_ARDUPILOT: "ardupilot", _PX4: "px4"}
+AUTOPILOTS = {_ARDUPILOT: "ardupilot", _PX4: "px4"}
+"""The autopilots magcomp knows, by HEARTBEAT.autopilot."""
 
-# MAV_TYPE of everything that moves by itself; ground stations, gimbals, radios are not here.
-_KINDS = (
+KINDS = (
     dict.fromkeys((2, 3, 4, 13, 14, 15, 29, 35), "copter")
     | dict.fromkeys((1, *range(19, 26)), "plane")
     | {10: "rover", 11: "boat", 12: "sub"}
     | dict.fromkeys((0, 7, 8, 9, 16, 17, 28, 43), "unknown")
 )
+"""MAV_TYPE of everything that moves by itself; ground stations, gimbals, radios are not here."""
 
 _ARMED = 128
 _FIRST_COMPONENT = 1
@@ -107,13 +108,13 @@ def _autopilots(heartbeats: Frames, table: Table) -> Iterable[Identity]:
             table["autopilot"].tolist(),
             strict=True,
         )
-        if autopilot in _AUTOPILOTS and kind in _KINDS
+        if autopilot in AUTOPILOTS and kind in KINDS
     }
     for system in {s for s, _ in last}:
         components = sorted(c for s, c in last if s == system)
         component = _FIRST_COMPONENT if _FIRST_COMPONENT in components else components[0]
         kind, autopilot = last[system, component]
-        yield Identity(system, component, _AUTOPILOTS[autopilot], _KINDS[kind])
+        yield Identity(system, component, AUTOPILOTS[autopilot], KINDS[kind])
 
 
 def _who(heartbeats: Frames) -> str:
