@@ -16,11 +16,11 @@ from pathlib import Path
 
 import numpy as np
 
-from magcomp.autopilot import ardupilot
+from magcomp.analysis import analyse
+from magcomp.autopilots import ardupilot
 from magcomp.cli.truth import KnownTruth
-from magcomp.log import read
 from magcomp.model import CURRENT, CompassResult
-from magcomp.session import analyse
+from magcomp.sources import read
 
 FIXTURES = Path(__file__).resolve().parent.parent / "sitl_fixtures"
 AMPERES = np.arange(0.0, 51.0, 5.0)

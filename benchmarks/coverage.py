@@ -15,14 +15,14 @@ from pathlib import Path
 
 import numpy as np
 
+from magcomp.analysis import analyse
 from magcomp.earth import EarthField, expected_field
 from magcomp.geometry import body_from_earth
 from magcomp.judge import largest_shift
 from magcomp.judge.heading_error import attitudes
-from magcomp.log import read
 from magcomp.model import CURRENT, CompassResult, Correction
-from magcomp.session import analyse
 from magcomp.simulate import Truth, write_tlog
+from magcomp.sources import read
 
 
 def true_error(

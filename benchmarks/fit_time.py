@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from magcomp.log import read
+from magcomp.analysis import analyse
 from magcomp.model import Recording, Series
-from magcomp.session import analyse
+from magcomp.sources import read
 
 DEFAULT_LOG = Path(__file__).parents[1] / "sitl_fixtures" / "flight.tlog"
 TIMES = (1, 2, 4, 8)

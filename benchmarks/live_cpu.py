@@ -22,9 +22,9 @@ import magcomp.cli  # noqa: F401 - before numpy, whose threads it limits as the 
 import numpy as np
 
 # isort: on
-from magcomp.log.tlog import read_tlog
-from magcomp.session.live import LiveSession
-from magcomp.session.refit import DEFAULT_SHARE
+from magcomp.live.refit import DEFAULT_SHARE
+from magcomp.live.session import LiveSession
+from magcomp.sources.tlog import read_tlog
 
 _BOUND = 0.15
 _STRETCH_S = 20.0

@@ -29,8 +29,8 @@ from pymavlink import mavutil
 from pymavlink.dialects.v20.ardupilotmega import PROTOCOL_MARKER_V2, mavlink_map
 from pymavlink.generator.mavcrc import x25crc
 
-from magcomp.log.columns import Message
-from magcomp.log.tlog import read_tlog
+from magcomp.sources.columns import Message
+from magcomp.sources.tlog import read_tlog
 
 MESSAGES = [message.name for message in Message]
 FIXTURES = Path(__file__).parents[1] / "sitl_fixtures"

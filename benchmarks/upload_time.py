@@ -17,9 +17,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from magcomp.link import connect
+from magcomp.live.latest import Latest
+from magcomp.live.upload import make_plan, write_plan
 from magcomp.model import ParameterSet
-from magcomp.session.latest import Latest
-from magcomp.session.upload import make_plan, write_plan
 from magcomp.simulate import Faults, Vehicle, scenario, serve
 
 _VALUES = {"MOT": -1.5, "OFS": 40.0, "DIA": 1.0625, "ODI": 0.015625}

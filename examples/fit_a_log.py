@@ -9,8 +9,8 @@ import sys
 
 import numpy as np
 
-from magcomp.log import read
-from magcomp.session import Options, analyse, parameter_set
+from magcomp.analysis import Options, analyse, parameter_set
+from magcomp.sources import read
 
 
 def main(path: str) -> None:

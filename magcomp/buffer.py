@@ -22,9 +22,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from magcomp.log.assemble import recording_from_bytes
-from magcomp.log.columns import WANTED, Message
 from magcomp.model import FloatArray, Recording
+from magcomp.sources.assemble import recording_from_bytes
+from magcomp.sources.columns import WANTED, Message
 
 DEFAULT_LIMIT = 8 << 20
 """Bytes: a quarter of an hour of three compasses at 50 Hz whole, most of an hour thinned.

@@ -6,9 +6,9 @@ from functools import cache
 
 import truth
 
-from magcomp.log import read
+from magcomp.analysis import analyse
 from magcomp.model import Analysis, CompassResult, Recording
-from magcomp.session import analyse
+from magcomp.sources import read
 
 
 @cache

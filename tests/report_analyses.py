@@ -9,10 +9,10 @@ from typing import Any
 
 from truth import FIXTURES
 
-from magcomp.log import read
+from magcomp.analysis import Options, analyse
 from magcomp.model import Analysis, Recording
 from magcomp.report import as_json
-from magcomp.session import Options, analyse
+from magcomp.sources import read
 
 
 @dataclass(frozen=True, eq=False)

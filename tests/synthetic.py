@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from magcomp.align import controls, readings, reported
 from magcomp.align.sample import APPLIED_LATER_S
-from magcomp.autopilot import ardupilot
+from magcomp.autopilots import ardupilot
 from magcomp.earth import EarthField, expected_field
 from magcomp.fit import Problem
 from magcomp.geometry import body_from_earth

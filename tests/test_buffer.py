@@ -20,8 +20,8 @@ from magcomp.link import Recorder, connect
 from magcomp.link.address import Replay
 from magcomp.link.replay import records
 from magcomp.link.state import LinkState
-from magcomp.log import read_tlog
 from magcomp.model import Recording, Series
+from magcomp.sources import read_tlog
 
 FIXTURES = Path(__file__).parents[1] / "sitl_fixtures"
 FIXTURE = FIXTURES / "flight.tlog"

@@ -14,10 +14,10 @@ from magcomp.experiments.motion import heading_errors, true_motion
 from magcomp.experiments.paper import CONTROLS, TABLE_1
 from magcomp.experiments.turntable import SECTORS, Row, turntable
 from magcomp.geometry import wrap_angle
-from magcomp.log import read
-from magcomp.log.truth import Truth, read_truth
 from magcomp.model import Series
 from magcomp.simulate import write_tlog
+from magcomp.sources import read
+from magcomp.sources.truth import Truth, read_truth
 
 KINDS = ("simulated", "recorded")
 PROMISED_DEG = 0.5

@@ -16,10 +16,10 @@ import recordings
 import simulated
 import truth
 
-from magcomp.log import read
+from magcomp.analysis import analyse, parameter_set
 from magcomp.model import Analysis, CompassResult, Grade
-from magcomp.parameters.files import read_parameter_file, write_parameter_file
-from magcomp.session import analyse, parameter_set
+from magcomp.sources import read
+from magcomp.writing.files import read_parameter_file, write_parameter_file
 
 COMPASSES = (1, 2, 3)
 AMPERES = np.arange(0.0, 50.1, 2.5)

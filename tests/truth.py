@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from magcomp.autopilot import ardupilot
+from magcomp.autopilots import ardupilot
 from magcomp.earth import expected_field
 from magcomp.geometry import body_from_earth, heading, wrap_angle
 

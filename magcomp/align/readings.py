@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from magcomp.autopilot import ardupilot
+from magcomp.autopilots import ardupilot
 from magcomp.errors import MissingDataError
 from magcomp.model import (
     BoolArray,

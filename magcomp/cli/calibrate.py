@@ -13,6 +13,7 @@ from typing import TypeVar
 
 import click
 
+from magcomp.analysis import Options, parameter_set
 from magcomp.cli.linking import (
     LinkOptions,
     StatusLine,
@@ -30,14 +31,13 @@ from magcomp.cli.work import present_parameters
 from magcomp.cli.writing import agreed, carry_out, need_consent, show_difference
 from magcomp.errors import ExitCode, InputError, UsageError
 from magcomp.link import Replay, parse_address
+from magcomp.live.guide import pilot_is_done
+from magcomp.live.session import LiveSession
+from magcomp.live.snapshot import LiveSnapshot
+from magcomp.live.upload import DISARM_S, new_file
 from magcomp.model import Analysis, Grade, ParameterSet, Recording
-from magcomp.parameters.files import SUFFIXES, write_parameter_file
 from magcomp.report import as_json
-from magcomp.session import Options, parameter_set
-from magcomp.session.guide import pilot_is_done
-from magcomp.session.live import LiveSession
-from magcomp.session.snapshot import LiveSnapshot
-from magcomp.session.upload import DISARM_S, new_file
+from magcomp.writing.files import SUFFIXES, write_parameter_file
 
 _Result = TypeVar("_Result")
 

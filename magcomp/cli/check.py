@@ -6,13 +6,13 @@ from pathlib import Path
 
 import click
 
+from magcomp.analysis import Options, regressor_in_force
 from magcomp.cli.options import Selection, json_option, log_argument, selection_options
 from magcomp.cli.output import answer, look
 from magcomp.cli.work import check_log
 from magcomp.errors import ExitCode
 from magcomp.model import Grade
 from magcomp.report import as_json
-from magcomp.session import Options, regressor_in_force
 
 
 @click.command("check")

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import click
 
+from magcomp.analysis import Options, parameter_set
 from magcomp.cli.linking import StatusLine
 from magcomp.cli.output import answer, look, progress
 from magcomp.cli.truth import KnownTruth
@@ -22,12 +23,11 @@ from magcomp.compensate import from_parameters, track
 from magcomp.errors import ExitCode, LinkError, MissingDataError
 from magcomp.experiments.motion import HeadingAccuracy, accuracy
 from magcomp.link import DEFAULT_RATES
-from magcomp.log.truth import read_truth
+from magcomp.live.session import LiveSession
 from magcomp.model import Analysis, Grade, ParameterSet, Recording
-from magcomp.parameters.files import write_parameter_file
-from magcomp.parameters.writer import raise_for_failure
-from magcomp.session import Options, parameter_set
-from magcomp.session.live import LiveSession
+from magcomp.sources.truth import read_truth
+from magcomp.writing.files import write_parameter_file
+from magcomp.writing.writer import raise_for_failure
 
 _CURRENTS = (0.0, 10.0, 20.0, 30.0, 40.0, 50.0)
 _RATES = {**DEFAULT_RATES, "SIMSTATE": 20.0}

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from magcomp.analysis import Options, parameter_set
 from magcomp.cli.options import (
     Selection,
     check_output,
@@ -20,10 +21,9 @@ from magcomp.cli.output import answer, complain, look
 from magcomp.cli.work import fit_log, present_parameters
 from magcomp.errors import ExitCode
 from magcomp.model import Grade
-from magcomp.parameters.files import SUFFIXES, write_parameter_file
 from magcomp.report import as_json
 from magcomp.report import files as report_files
-from magcomp.session import Options, parameter_set
+from magcomp.writing.files import SUFFIXES, write_parameter_file
 
 
 @click.command("fit")

@@ -13,6 +13,7 @@ import click
 import numpy as np
 
 from magcomp import __version__
+from magcomp.analysis import Options
 from magcomp.cli.heading_live import Following, follow, is_live
 from magcomp.cli.linking import LinkOptions, positive_seconds, reach_options
 from magcomp.cli.options import Selection, selection_options
@@ -22,11 +23,10 @@ from magcomp.compensate import Gravity, Track, from_parameters, track
 from magcomp.errors import ExitCode, MissingDataError, ParameterFileError, UsageError
 from magcomp.experiments.motion import HeadingAccuracy, accuracy, heading_errors
 from magcomp.geometry import wrap_angle
-from magcomp.log import read
-from magcomp.log.truth import Truth, read_truth
 from magcomp.model import FloatArray, Grade, InForce, Recording, Series
-from magcomp.parameters.files import read_parameter_file
-from magcomp.session import Options
+from magcomp.sources import read
+from magcomp.sources.truth import Truth, read_truth
+from magcomp.writing.files import read_parameter_file
 
 _NAMES = ("raw", "corrected", "fused")
 _SIGNS = (".", "+", "•")

@@ -15,9 +15,9 @@ from magcomp.cli.output import answer
 from magcomp.cli.work import present_parameters
 from magcomp.errors import AddressError, ExitCode
 from magcomp.link import Replay, parse_address
+from magcomp.live.heading import LiveHeading, Sensors, corrections, live_headings
+from magcomp.live.session import LiveSession
 from magcomp.model import Recording
-from magcomp.session.heading import LiveHeading, Sensors, corrections, live_headings
-from magcomp.session.live import LiveSession
 
 _LOOK_S = 0.2
 _POSITION_S = 3.0

@@ -12,9 +12,9 @@ from typing import TypeVar
 
 import click
 
+from magcomp.analysis.analyse import REGRESSORS
 from magcomp.errors import OutputError, UsageError
 from magcomp.fit import METHODS
-from magcomp.session.analyse import REGRESSORS
 
 _Result = TypeVar("_Result")
 

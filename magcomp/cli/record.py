@@ -19,8 +19,8 @@ from magcomp.cli.linking import (
 from magcomp.cli.options import check_output
 from magcomp.cli.output import answer, complain
 from magcomp.errors import ExitCode
-from magcomp.session.live import LiveSession
-from magcomp.session.snapshot import LiveSnapshot
+from magcomp.live.session import LiveSession
+from magcomp.live.snapshot import LiveSnapshot
 
 _LOOK_S = 0.25
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from magcomp.analysis import Options
 from magcomp.cli.options import (
     Selection,
     check_output,
@@ -18,7 +19,6 @@ from magcomp.cli.work import fit_log
 from magcomp.errors import ExitCode
 from magcomp.model import Grade
 from magcomp.report.files import SUFFIXES, report_text, write_text
-from magcomp.session import Options
 
 
 @click.command("report")

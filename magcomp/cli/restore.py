@@ -17,9 +17,9 @@ from magcomp.cli.output import complain
 from magcomp.cli.upload import VehicleLink, Writing, backup_option, dry_run_option, wait_option
 from magcomp.cli.writing import need_consent
 from magcomp.errors import ExitCode
-from magcomp.parameters.events import Standing
-from magcomp.parameters.journal import JournalState
-from magcomp.session.upload import finish_restore, read_backup
+from magcomp.live.upload import finish_restore, read_backup
+from magcomp.writing.events import Standing
+from magcomp.writing.journal import JournalState
 
 _STANDS = {
     Standing.OLD: "the vehicle held everything as in the backup",

@@ -11,8 +11,8 @@ from magcomp.cli.linking import stop_on_interrupt
 from magcomp.cli.output import answer, complain
 from magcomp.errors import ExitCode
 from magcomp.link import read_signing_key
-from magcomp.parameters.files import read_parameter_file
 from magcomp.simulate import PROGRAMS, Faults, Vehicle, scenario, serve
+from magcomp.writing.files import read_parameter_file
 
 _ADDRESS = "udpout:127.0.0.1:14550"
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from magcomp.autopilot import ardupilot
+from magcomp.autopilots import ardupilot
 from magcomp.earth import expected_field
 from magcomp.errors import InputError
 from magcomp.geometry import body_from_earth

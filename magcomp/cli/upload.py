@@ -23,11 +23,11 @@ from magcomp.cli.output import complain
 from magcomp.cli.writing import agreed, carry_out, need_consent, show_difference
 from magcomp.errors import ExitCode, UsageError
 from magcomp.link import Connection, Replay, connect
+from magcomp.live.latest import Latest
+from magcomp.live.upload import make_plan, new_file, wait_disarmed, write_plan
 from magcomp.model import ParameterSet, Vehicle
-from magcomp.parameters.files import read_parameter_file
-from magcomp.parameters.plan import WritePlan
-from magcomp.session.latest import Latest
-from magcomp.session.upload import make_plan, new_file, wait_disarmed, write_plan
+from magcomp.writing.files import read_parameter_file
+from magcomp.writing.plan import WritePlan
 
 backup_option = click.option(
     "--backup",

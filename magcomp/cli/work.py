@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
+from magcomp.analysis import Options, analyse, check
 from magcomp.cli.output import progress
-from magcomp.log import read
 from magcomp.model import Analysis, Recording, Verdict
-from magcomp.session import Options, analyse, check
+from magcomp.sources import read
 
 _READING = 0.1
 """Share of the progress bar that reading the log takes."""

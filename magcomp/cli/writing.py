@@ -13,7 +13,7 @@ import click
 from magcomp.cli.linking import StatusLine
 from magcomp.cli.output import answer, complain, look
 from magcomp.errors import ExitCode, MagcompError, UsageError
-from magcomp.parameters.events import (
+from magcomp.writing.events import (
     Event,
     Mismatch,
     Outcome,
@@ -23,9 +23,9 @@ from magcomp.parameters.events import (
     RollingBack,
     Stage,
 )
-from magcomp.parameters.files import format_value
-from magcomp.parameters.plan import WritePlan
-from magcomp.parameters.writer import raise_for_failure
+from magcomp.writing.files import format_value
+from magcomp.writing.plan import WritePlan
+from magcomp.writing.writer import raise_for_failure
 
 if TYPE_CHECKING:
     from rich.console import RenderableType

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from magcomp.align import controls, readings, reported
+from magcomp.analysis import Options, analyse
 from magcomp.earth import EarthField
 from magcomp.errors import MissingDataError
 from magcomp.experiments.paper import CONTROLS
@@ -14,7 +15,6 @@ from magcomp.fit import Problem, fit_ellipsoid, paper_line
 from magcomp.fit.levels import usable_levels
 from magcomp.fit.line import SpaceLine
 from magcomp.model import CURRENT, FloatArray, IntArray, MotorFit, Recording, Samples
-from magcomp.session import Options, analyse
 
 METHODS = ("uncorrected", "ellipsoid", "paper", "magcomp")
 """The columns of Table 1."""

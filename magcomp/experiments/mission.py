@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
+from magcomp.analysis import Options, analyse
 from magcomp.compensate import track
 from magcomp.errors import MissingDataError
 from magcomp.experiments.motion import heading_errors
-from magcomp.log.truth import Truth
 from magcomp.model import FloatArray, Recording
-from magcomp.session import Options, analyse
+from magcomp.sources.truth import Truth
 
 _METRES_PER_DEGREE = 111_320.0
 _AIRBORNE_M = 2.0

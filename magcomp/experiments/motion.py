@@ -8,8 +8,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from magcomp.geometry import wrap_angle
-from magcomp.log.truth import Truth
 from magcomp.model import FloatArray
+from magcomp.sources.truth import Truth
 
 LEAST_UPRIGHT = np.cos(np.radians(60.0))
 """Headings are compared while the vehicle leans less than 60°: beyond, they mean little."""

@@ -12,10 +12,10 @@ from magcomp import __version__
 from magcomp.experiments.mission import Flights, flights
 from magcomp.experiments.paper import TABLE_1
 from magcomp.experiments.turntable import Turntable, turntable
-from magcomp.log import read
-from magcomp.log.truth import Truth, read_truth
 from magcomp.model import Recording
 from magcomp.simulate import write_tlog
+from magcomp.sources import read
+from magcomp.sources.truth import Truth, read_truth
 
 TURNTABLE = "turntable_paper.tlog"
 UNCOMPENSATED = "mission_uncompensated.tlog"

@@ -33,8 +33,8 @@ from magcomp.experiments.motion import true_motion
 from magcomp.experiments.paper import CONTROLS
 from magcomp.fit import Problem
 from magcomp.geometry import heading, wrap_angle
-from magcomp.log.truth import Truth
 from magcomp.model import CURRENT, BoolArray, FloatArray, IntArray, Lags, Recording, Samples, Series
+from magcomp.sources.truth import Truth
 
 SECTORS = 24
 

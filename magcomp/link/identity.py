@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from magcomp.link.framing import Message
-from magcomp.log.vehicles import AUTOPILOTS, KINDS
 from magcomp.model import Vehicle
+from magcomp.sources.vehicles import AUTOPILOTS, KINDS
 
 _DEVICE_ID_NAMES = {
     "ardupilot": ("COMPASS_DEV_ID", "COMPASS_DEV_ID2", "COMPASS_DEV_ID3"),

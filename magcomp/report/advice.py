@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
+from magcomp.analysis import Options
 from magcomp.report import words
-from magcomp.session import Options
 
 GRADES = ("good", "marginal", "rejected")
 

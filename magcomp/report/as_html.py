@@ -11,15 +11,15 @@ from typing import Any
 import numpy as np
 
 from magcomp import __version__
+from magcomp.analysis import Options, parameter_set
 from magcomp.model import Analysis, Grade, Recording
-from magcomp.parameters.files import format_parameters
 from magcomp.report import advice, as_json, html_tables, words
 from magcomp.report.evidence import CompassPlots, compass_plots
 from magcomp.report.figure import Figure, quantity_of
 from magcomp.report.figures import figures
 from magcomp.report.html_page import ASSETS, canvas, page
 from magcomp.report.html_parts import Numbers, badge, sign, text, with_code
-from magcomp.session import Options, parameter_set
+from magcomp.writing.files import format_parameters
 
 _EVIDENCE = ("cloud", "centres", "shift", "strength", "residuals")
 

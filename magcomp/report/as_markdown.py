@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from magcomp.analysis import Options
 from magcomp.report import advice, words
 from magcomp.report.figure import Quantity, quantity_of
 from magcomp.report.html_parts import parameter
-from magcomp.session import Options
 
 _SPECIAL = str.maketrans({sign: f"\\{sign}" for sign in "\\`*_{}[]<>#|"})
 

@@ -6,10 +6,10 @@ import json
 import os
 from pathlib import Path
 
+from magcomp.analysis import Options
 from magcomp.errors import OutputError, UsageError
 from magcomp.model import Analysis, Recording
 from magcomp.report import as_json
-from magcomp.session import Options
 
 SUFFIXES = (".html", ".json", ".md")
 

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from magcomp.autopilot import ardupilot
-from magcomp.autopilot.ardupilot import MotorCompensation
+from magcomp.autopilots import ardupilot
+from magcomp.autopilots.ardupilot import MotorCompensation
 from magcomp.simulate.parameters import DEVICE_IDS, ParameterStore
 from magcomp.simulate.truth import MOTORS
 

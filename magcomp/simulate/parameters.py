@@ -16,7 +16,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from magcomp.autopilot import ardupilot
+from magcomp.autopilots import ardupilot
 from magcomp.simulate.truth import Truth
 
 DEVICE_IDS = (97539, 131874, 263178)

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from magcomp.autopilot.ardupilot import soft_iron_matrix
+from magcomp.autopilots.ardupilot import soft_iron_matrix
 from magcomp.errors import OutputError
 
 FloatArray = NDArray[np.float64]

@@ -18,7 +18,7 @@ from textual.binding import Binding, BindingType
 from textual.screen import Screen
 
 from magcomp.errors import MagcompError, UsageError
-from magcomp.session.snapshot import LiveSnapshot
+from magcomp.live.snapshot import LiveSnapshot
 from magcomp.tui import fitting, opening, status, writing
 from magcomp.tui.choices import Choice
 from magcomp.tui.help_text import help_text, key_lines

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from magcomp.autopilot import ardupilot
+from magcomp.autopilots import ardupilot
 from magcomp.geometry import heading
+from magcomp.live.snapshot import CompassNow, LiveSnapshot
 from magcomp.model import THROTTLE, Analysis
-from magcomp.session.snapshot import CompassNow, LiveSnapshot
 from magcomp.tui.work import Work, Writing
 
 

@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from magcomp.autopilot import ardupilot
+from magcomp.autopilots import ardupilot
 from magcomp.model import Analysis, ParameterSet
-from magcomp.parameters.events import (
+from magcomp.report import words
+from magcomp.writing.events import (
     Event,
     Intends,
     Mismatch,
@@ -21,8 +22,7 @@ from magcomp.parameters.events import (
     Standing,
     Written,
 )
-from magcomp.parameters.files import format_value
-from magcomp.report import words
+from magcomp.writing.files import format_value
 
 
 @dataclass(frozen=True)

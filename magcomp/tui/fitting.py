@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from magcomp.analysis import Options
 from magcomp.errors import UsageError
 from magcomp.model import Analysis, Recording
-from magcomp.session import Options
 from magcomp.tui import writing
 from magcomp.tui.pictures import CompassPicture
 from magcomp.tui.screens.dialogs import AskText

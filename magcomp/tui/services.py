@@ -10,21 +10,21 @@ from datetime import datetime
 from pathlib import Path
 from typing import Protocol
 
+from magcomp.analysis import Options, analyse, check
 from magcomp.errors import LinkError, MagcompError
 from magcomp.link import SerialPort, serial_ports
-from magcomp.log import read
+from magcomp.live.session import LiveSession
+from magcomp.live.snapshot import LiveSnapshot
+from magcomp.live.upload import new_file
 from magcomp.model import Analysis, ParameterSet, Recording, Vehicle, Verdict
-from magcomp.parameters.events import Event, Outcome
-from magcomp.parameters.journal import journal_path
-from magcomp.parameters.plan import WritePlan
 from magcomp.report.evidence import compass_plots
-from magcomp.session import Options, analyse, check
-from magcomp.session.live import LiveSession
-from magcomp.session.snapshot import LiveSnapshot
-from magcomp.session.upload import new_file
 from magcomp.simulate import Vehicle as SimulatedVehicle
 from magcomp.simulate import scenario, serve
+from magcomp.sources import read
 from magcomp.tui.pictures import CompassPicture, picture
+from magcomp.writing.events import Event, Outcome
+from magcomp.writing.journal import journal_path
+from magcomp.writing.plan import WritePlan
 
 Progress = Callable[[str, float], None]
 """What is being done, and the share done, 0 … 1."""
@@ -205,7 +205,7 @@ def fit(
     Raises
     ------
     MagcompError
-        As :func:`magcomp.session.analyse`.
+        As :func:`magcomp.analysis.analyse`.
     """
     analysis = analyse(recording, options, progress)
     pictures = {}

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from magcomp.live.snapshot import LiveSnapshot
 from magcomp.model import Grade
 from magcomp.report import words
-from magcomp.session.snapshot import LiveSnapshot
 from magcomp.tui.widgets.top_bar import STEPS, Status
 from magcomp.tui.work import Work
 

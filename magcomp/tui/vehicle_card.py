@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from magcomp.autopilot import ardupilot
+from magcomp.autopilots import ardupilot
 from magcomp.model import Grade, Recording, Vehicle, Verdict
 from magcomp.report import words
 

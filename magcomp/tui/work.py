@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from magcomp.analysis import Options, parameter_set
 from magcomp.model import Analysis, Grade, ParameterSet, Recording
-from magcomp.session import Options, parameter_set
 from magcomp.tui.changes import ChangeRow
 from magcomp.tui.pictures import CompassPicture
 from magcomp.tui.vehicle_card import VehicleCard

@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING
 
 from magcomp.errors import MagcompError
 from magcomp.model import Grade
-from magcomp.parameters.events import Event, Outcome
-from magcomp.parameters.files import SUFFIXES, format_value, write_parameter_file
-from magcomp.parameters.plan import WritePlan
-from magcomp.parameters.writer import raise_for_failure
 from magcomp.report import words
 from magcomp.tui.changes import ChangeRow, after_event, change_rows, left_out_warnings
 from magcomp.tui.screens.dialogs import AskText, Confirm, Message
 from magcomp.tui.services import Progress
 from magcomp.tui.status import WRITING
 from magcomp.tui.work import Work, Writing
+from magcomp.writing.events import Event, Outcome
+from magcomp.writing.files import SUFFIXES, format_value, write_parameter_file
+from magcomp.writing.plan import WritePlan
+from magcomp.writing.writer import raise_for_failure
 
 if TYPE_CHECKING:
     from magcomp.tui.app import MagcompApp

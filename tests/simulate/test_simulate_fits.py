@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from magcomp import earth, geometry
-from magcomp.autopilot import ardupilot
-from magcomp.log import read
-from magcomp.session.analyse import analyse
+from magcomp.analysis.analyse import analyse
+from magcomp.autopilots import ardupilot
 from magcomp.simulate import write_tlog
+from magcomp.sources import read
 
 YAWS = np.linspace(-np.pi, np.pi, 72)
 TILT = np.radians(20.0)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from magcomp import earth, geometry
-from magcomp.autopilot import ardupilot
-from magcomp.autopilot.ardupilot import Calibration, MotorCompensation
+from magcomp.autopilots import ardupilot
+from magcomp.autopilots.ardupilot import Calibration, MotorCompensation
 from magcomp.simulate import PROGRAMS, Vehicle, physics, scenario
 from magcomp.simulate.motion import euler
 from magcomp.simulate.pilot import Pilot

@@ -13,10 +13,10 @@ from pymavlink import mavutil
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from magcomp.errors import OutputError
-from magcomp.log import read
 from magcomp.simulate import Truth, Vehicle, record, scenario, write_tlog
 from magcomp.simulate.ground import DEFAULT_RATES
 from magcomp.simulate.outputs import motor_outputs
+from magcomp.sources import read
 
 FIXTURES = Path(__file__).parents[2] / "sitl_fixtures"
 

@@ -6,10 +6,10 @@ import pytest
 
 from magcomp.model import ParameterSet
 from magcomp.model import Vehicle as Identity
-from magcomp.parameters import writer
-from magcomp.parameters.events import Standing
-from magcomp.parameters.plan import plan
 from magcomp.simulate import Faults, FaultyLink, LocalConnection, Vehicle, scenario
+from magcomp.writing import writer
+from magcomp.writing.events import Standing
+from magcomp.writing.plan import plan
 
 NAMES = [
     f"COMPASS_{kind}{compass}_{axis}"

@@ -9,6 +9,8 @@ import numpy as np
 
 from magcomp.buffer import BANDS, LEVELS, SECTORS, Coverage
 from magcomp.link import LinkStatistics, SerialPort
+from magcomp.live.guide import Guidance, Situation
+from magcomp.live.snapshot import CompassNow, LiveSnapshot
 from magcomp.model import (
     Analysis,
     CompassResult,
@@ -29,8 +31,6 @@ from magcomp.model import (
     Verdict,
 )
 from magcomp.model import Coverage as Covered
-from magcomp.session.guide import Guidance, Situation
-from magcomp.session.snapshot import CompassNow, LiveSnapshot
 from magcomp.tui.pictures import CompassPicture, Unexplained, error_rows, shift
 from magcomp.tui.vehicle_card import card_of_recording
 from magcomp.tui.work import Work

@@ -14,8 +14,12 @@ from typing import Any
 import made
 
 from magcomp.errors import LinkError
+from magcomp.live.snapshot import LiveSnapshot
 from magcomp.model import ParameterSet, Recording
-from magcomp.parameters.events import (
+from magcomp.tui import MagcompApp
+from magcomp.tui.services import Services, Simulation
+from magcomp.tui.settings import Settings
+from magcomp.writing.events import (
     Event,
     Intends,
     Mismatch,
@@ -27,12 +31,8 @@ from magcomp.parameters.events import (
     Standing,
     Written,
 )
-from magcomp.parameters.files import read_parameter_file, write_parameter_file
-from magcomp.parameters.plan import WritePlan, plan
-from magcomp.session.snapshot import LiveSnapshot
-from magcomp.tui import MagcompApp
-from magcomp.tui.services import Services, Simulation
-from magcomp.tui.settings import Settings
+from magcomp.writing.files import read_parameter_file, write_parameter_file
+from magcomp.writing.plan import WritePlan, plan
 
 PATIENCE_S = 30.0
 DEVICES = dict(zip(("", "2", "3"), made.QUAD.device_ids, strict=True))

@@ -11,8 +11,8 @@ import made
 import scripted
 from scripted import ScriptedSession, until
 
+from magcomp.live.guide import Situation
 from magcomp.model import Grade
-from magcomp.session.guide import Situation
 from magcomp.tui import MagcompApp, writing
 from magcomp.tui.changes import READ_BACK
 from magcomp.tui.screens.dialogs import Confirm, Message

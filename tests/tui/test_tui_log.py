@@ -14,8 +14,8 @@ from textual.widgets import Input
 from truth import FIXTURES
 
 from magcomp.cli.app import app as command_line
-from magcomp.parameters.files import read_parameter_file
 from magcomp.tui.screens.dialogs import Confirm, Message
+from magcomp.writing.files import read_parameter_file
 
 SWEEP = FIXTURES / "sweep_current.tlog"
 

@@ -7,7 +7,7 @@ import numpy as np
 import scripted
 from scripted import screen
 
-from magcomp.log import read
+from magcomp.sources import read
 from magcomp.tui import opening
 from magcomp.tui.screens.dialogs import Confirm
 from magcomp.tui.services import Services

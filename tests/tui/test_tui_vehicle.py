@@ -11,12 +11,12 @@ import scripted
 from scripted import ScriptedSession, press, screen, until
 
 from magcomp.errors import LinkTimeoutError, VehicleRefusedError, WriteError
+from magcomp.live.guide import Guidance, Situation
 from magcomp.model import Grade, ParameterChange, ParameterHistory
-from magcomp.parameters.files import read_parameter_file
-from magcomp.session.guide import Guidance, Situation
 from magcomp.tui import opening, writing
 from magcomp.tui.screens.dialogs import Confirm, Message
 from magcomp.tui.work import Work
+from magcomp.writing.files import read_parameter_file
 
 
 async def connected(pilot) -> None:

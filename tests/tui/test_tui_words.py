@@ -15,13 +15,13 @@ from scripted import screen, until
 from textual.color import Color
 
 from magcomp.model import Grade, ParameterSet
-from magcomp.parameters.events import Mismatch, Outcome, Reason, RollingBack, Standing, Written
 from magcomp.tui.before_after import HeadingPair, HeadingWatch, heading_pairs
 from magcomp.tui.changes import after_event, change_rows
 from magcomp.tui.pictures import round_ticks
 from magcomp.tui.themes import SUN
 from magcomp.tui.widgets.bars import bar
 from magcomp.tui.work import Writing
+from magcomp.writing.events import Mismatch, Outcome, Reason, RollingBack, Standing, Written
 
 
 def test_importing_the_command_line_does_not_import_textual():

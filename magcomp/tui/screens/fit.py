@@ -12,10 +12,10 @@ from textual.content import Content
 from textual.widget import Widget
 from textual.widgets import ProgressBar, Static
 
+from magcomp.analysis import Options
 from magcomp.fit import METHODS
 from magcomp.model import CURRENT, Analysis, Grade
 from magcomp.report import words
-from magcomp.session import Options
 from magcomp.tui import fitting
 from magcomp.tui.pictures import AXES, CompassPicture
 from magcomp.tui.screens.step import StepScreen

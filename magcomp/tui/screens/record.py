@@ -12,8 +12,8 @@ from textual.widget import Widget
 from textual.widgets import Static
 
 from magcomp.buffer import LEVELS
+from magcomp.live.snapshot import LiveSnapshot
 from magcomp.report import words
-from magcomp.session.snapshot import LiveSnapshot
 from magcomp.tui.screens.step import StepScreen
 from magcomp.tui.widgets.bars import bar
 from magcomp.tui.widgets.coverage_map import CoverageMap, LevelTable

@@ -7,7 +7,7 @@ from textual.content import Content
 from textual.widgets import Static
 
 from magcomp.buffer import BANDS, LEVELS, SECTORS, Coverage
-from magcomp.session.guide import LEVEL_ENOUGH
+from magcomp.live.guide import LEVEL_ENOUGH
 from magcomp.tui.widgets.bars import bar
 
 _MANY = 20

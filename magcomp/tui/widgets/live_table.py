@@ -5,7 +5,7 @@ from __future__ import annotations
 from textual.content import Content
 from textual.widgets import Static
 
-from magcomp.session.snapshot import CompassNow, LiveSnapshot
+from magcomp.live.snapshot import CompassNow, LiveSnapshot
 from magcomp.tui.widgets.bars import bar
 from magcomp.tui.widgets.verdict_text import grade_word
 

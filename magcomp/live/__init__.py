@@ -1,0 +1,1 @@
+"""A live vehicle from connecting to writing, without a user interface."""

@@ -1,0 +1,209 @@
+"""A live vehicle's heading: as reported, as corrected, and fused with the gyro."""
+
+from __future__ import annotations
+
+import math
+import queue
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from magcomp.compensate import Compensator, Fusion, Motion, Reading, from_parameters, fuse
+from magcomp.fit.flight import LAG_MEAN_S
+from magcomp.geometry import gravity_direction
+from magcomp.live.latest import decoded
+from magcomp.model import CURRENT, InForce, Vehicle
+from magcomp.sources.columns import Message
+
+_FIELD_MESSAGES = {1: Message.RAW_IMU, 2: Message.SCALED_IMU2, 3: Message.SCALED_IMU3}
+_USED = frozenset((Message.RAW_IMU, Message.ATTITUDE, Message.VFR_HUD, Message.BATTERY_STATUS))
+_LOOK_S = 0.2
+_MEMORY = 64
+"""Attitudes kept: a second and more of the 50 Hz asked for."""
+
+
+@dataclass(frozen=True, slots=True)
+class LiveHeading:
+    """The headings at one instant, radians; NaN before the first reading.
+
+    Attributes
+    ----------
+    time
+        Seconds of the vehicle's own clock.
+    raw
+        Of the field as the autopilot reports it.
+    corrected
+        Of the same reading, corrected.
+    fused
+        Compass and gyro.
+    """
+
+    time: float
+    raw: float
+    corrected: float
+    fused: float
+
+
+class Sensors:
+    """Takes every frame of a link and gives one compass's sensor events, in order.
+
+    Parameters
+    ----------
+    compass
+        1, 2 or 3.
+
+    Notes
+    -----
+    A frame repeats the field until the compass is read again (AUTOPILOTS.md, Timing): only a
+    change is a reading. Its age is the lag a fit expects before it has estimated one.
+    """
+
+    def __init__(self, compass: int) -> None:
+        self._field_message = _FIELD_MESSAGES[compass]
+        self._wanted = _USED | {self._field_message}
+        self._frames: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+        self._attitudes: deque[tuple[float, float, float]] = deque(maxlen=_MEMORY)
+        self._field: tuple[float, float, float] | None = None
+
+    def add(self, unix_us: int, frame: bytes) -> None:  # noqa: ARG002
+        """Take one whole frame, in the link's thread."""
+        if _message(frame) in self._wanted:
+            self._frames.put(frame)
+
+    def events(
+        self, vehicle: Vehicle, regressor: str | None, over: Callable[[], bool]
+    ) -> Iterator[Motion | Reading]:
+        """Sensor events as they arrive, until ``over``.
+
+        Parameters
+        ----------
+        vehicle
+            Others on the link are left out.
+        regressor
+            The control quantity that a reading carries; None where none is needed.
+        over
+            Asked when nothing comes, and before each frame.
+        """
+        u = 0.0 if regressor is None else math.nan
+        while not over():
+            try:
+                frame = self._frames.get(timeout=_LOOK_S)
+            except queue.Empty:
+                continue
+            if _source(frame) != (vehicle.system, vehicle.component):
+                continue
+            message = _message(frame)
+            content = decoded(frame, message)
+            if message == Message.ATTITUDE:
+                self._attitudes.append(
+                    (_seconds(content), float(content["roll"]), float(content["pitch"]))
+                )
+            elif message in (Message.VFR_HUD, Message.BATTERY_STATUS):
+                told = None if regressor is None else _control(content, message, regressor)
+                u = u if told is None else told
+            elif self._attitudes:
+                yield from self._imu(message, content, u)
+
+    def _imu(self, message: int, content: Any, u: float) -> Iterator[Motion | Reading]:
+        time = _seconds(content)
+        field = (float(content["xmag"]), float(content["ymag"]), float(content["zmag"]))
+        # A compass the autopilot does not have is reported as exactly (0, 0, 0).
+        if message == self._field_message and any(field) and field != self._field:
+            self._field = field
+            measured = time - LAG_MEAN_S
+            roll, pitch = self._lean(measured)
+            yield Reading(measured, field, u, roll, pitch)
+        if message == Message.RAW_IMU:
+            gyro = tuple(1e-3 * float(content[name]) for name in ("xgyro", "ygyro", "zgyro"))
+            yield Motion(time, gyro, gravity_direction(*self._lean(time)).tolist())
+
+    def _lean(self, time: float) -> tuple[float, float]:
+        """Roll and pitch of the attitude nearest to a moment."""
+        _, roll, pitch = min(self._attitudes, key=lambda known: abs(known[0] - time))
+        return roll, pitch
+
+
+def live_headings(
+    sensors: Sensors,
+    vehicle: Vehicle,
+    wanted: InForce,
+    present: InForce,
+    declination: float,
+    over: Callable[[], bool],
+) -> Iterator[LiveHeading]:
+    """Headings of a live vehicle, one for each message of its gyro.
+
+    Parameters
+    ----------
+    sensors
+        A sink of the vehicle's link.
+    vehicle
+        Whose heading.
+    wanted, present
+        The correction to show, and the one the autopilot applies already.
+    declination
+        Radians, east positive.
+    over
+        Ends it; asked at least five times a second.
+
+    Raises
+    ------
+    InputError
+        The two corrections multiply different control quantities.
+    """
+    regressor = wanted.regressor or present.regressor
+    compensator = Compensator.over(wanted.correction, present, regressor or CURRENT, declination)
+    unchanged = Compensator.over(present.correction, present, regressor or CURRENT, declination)
+    raw = math.nan
+
+    def watched() -> Iterator[Motion | Reading]:
+        nonlocal raw
+        for event in sensors.events(vehicle, regressor, over):
+            if isinstance(event, Reading):
+                raw = unchanged.correct(event.field, 0.0, event.roll, event.pitch)
+            yield event
+
+    for answer in fuse(watched(), compensator, Fusion()):
+        yield LiveHeading(answer.time, raw, answer.corrected, answer.fused)
+
+
+def corrections(
+    present: Mapping[str, float], chosen: Mapping[str, float], compass: int
+) -> tuple[InForce, InForce]:
+    """The correction to show and the one in force.
+
+    Parameters
+    ----------
+    present
+        What the vehicle holds.
+    chosen
+        Values to be taken instead; empty for the correction in force.
+    compass
+        1, 2 or 3.
+    """
+    return from_parameters({**present, **chosen}, compass), from_parameters(present, compass)
+
+
+def _message(frame: bytes) -> int:
+    return frame[5] if frame[0] == 0xFE else int.from_bytes(frame[7:10], "little")
+
+
+def _source(frame: bytes) -> tuple[int, int]:
+    return (frame[3], frame[4]) if frame[0] == 0xFE else (frame[5], frame[6])
+
+
+def _seconds(content: Any) -> float:
+    if "time_usec" in content.dtype.names:
+        return float(content["time_usec"]) * 1e-6
+    return float(content["time_boot_ms"]) * 1e-3
+
+
+def _control(content: Any, message: int, regressor: str) -> float | None:
+    """The control quantity, where this message tells it."""
+    if regressor == CURRENT:
+        # A second battery's current multiplies nothing; −1 says there is no sensor.
+        if message != Message.BATTERY_STATUS or content["id"] or content["current_battery"] < 0:
+            return None
+        return float(content["current_battery"]) * 0.01
+    return float(content["throttle"]) * 0.01 if message == Message.VFR_HUD else None

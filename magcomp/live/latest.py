@@ -1,0 +1,191 @@
+"""The newest of each message of every sender, decoded only when somebody looks."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from magcomp.model import Vehicle
+from magcomp.sources.columns import WANTED, Message, layout, text
+
+_SENSOR_COMPASS = 0x04  # MAV_SYS_STATUS_SENSOR_3D_MAG
+_ARMED = 0x80  # MAV_MODE_FLAG_SAFETY_ARMED
+_FIELD_MESSAGES = {1: Message.RAW_IMU, 2: Message.SCALED_IMU2, 3: Message.SCALED_IMU3}
+_STALE_US = 2_000_000
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Now:
+    """What a vehicle last said.
+
+    Attributes
+    ----------
+    stamp_us
+        When its newest message arrived, microseconds since 1970; 0 before the first.
+    armed
+        None before the first heartbeat.
+    fields
+        Compass number to the corrected field in mGauss, where it came within two seconds.
+    silent
+        Compass numbers whose field came before, but no more.
+    attitude
+        Roll, pitch, yaw in radians.
+    throttle, current, voltage
+        0 … 1, A, V; None where absent.
+    height_m, speed
+        Above home, or above where it was switched on; over the ground in m/s.
+    compass_trouble
+        The autopilot says that its compass is not healthy.
+    """
+
+    stamp_us: int
+    armed: bool | None
+    fields: Mapping[int, Vector]
+    silent: tuple[int, ...]
+    attitude: Vector | None
+    throttle: float | None
+    current: float | None
+    voltage: float | None
+    height_m: float | None
+    speed: float | None
+    compass_trouble: bool
+
+
+class Latest:
+    """Takes every frame of a link and keeps the newest of each kind."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._frames: dict[tuple[int, int], dict[int, tuple[int, bytes]]] = {}
+        self._parameters: dict[tuple[int, int], dict[str, float]] = {}
+        self._first_us = 0
+        self._last_us = 0
+
+    def add(self, unix_us: int, frame: bytes) -> None:
+        """Take one whole frame that arrived at ``unix_us``."""
+        if frame[0] == 0xFE:
+            source, message = (frame[3], frame[4]), frame[5]
+        else:
+            source, message = (frame[5], frame[6]), int.from_bytes(frame[7:10], "little")
+        with self._lock:
+            self._first_us = self._first_us or unix_us
+            self._last_us = unix_us
+            if message not in WANTED or not _is_of_interest(message, frame):
+                return
+            self._frames.setdefault(source, {})[message] = (unix_us, frame)
+            if message == Message.PARAM_VALUE:
+                row = decoded(frame, message)
+                name = text(np.array([row["param_id"]]))[0]
+                self._parameters.setdefault(source, {})[name] = float(row["param_value"])
+
+    @property
+    def span_s(self) -> float:
+        """Seconds from the first frame to the newest."""
+        with self._lock:
+            return max(self._last_us - self._first_us, 0) * 1e-6
+
+    def parameters(self, vehicle: Vehicle) -> Mapping[str, float]:
+        """Every parameter value the vehicle has reported, by name."""
+        with self._lock:
+            return dict(self._parameters.get((vehicle.system, vehicle.component), {}))
+
+    def heartbeat_us(self, vehicle: Vehicle) -> int:
+        """When its newest heartbeat arrived, microseconds since 1970; 0 before the first."""
+        with self._lock:
+            kept = self._frames.get((vehicle.system, vehicle.component), {})
+            return kept[Message.HEARTBEAT][0] if Message.HEARTBEAT in kept else 0
+
+    def now(self, vehicle: Vehicle) -> Now:
+        """Decode what the vehicle last said."""
+        with self._lock:
+            kept = dict(self._frames.get((vehicle.system, vehicle.component), {}))
+        newest = max((stamp for stamp, _ in kept.values()), default=0)
+        rows = {
+            message: decoded(frame, message)
+            for message, (stamp, frame) in kept.items()
+            if message in (Message.HEARTBEAT, Message.SYS_STATUS) or newest - stamp < _STALE_US
+        }
+        heartbeat = rows.get(Message.HEARTBEAT)
+        attitude = rows.get(Message.ATTITUDE)
+        hud = rows.get(Message.VFR_HUD)
+        fields = {
+            number: _vector(rows[message], ("xmag", "ymag", "zmag"))
+            for number, message in _FIELD_MESSAGES.items()
+            if message in rows
+        }
+        return Now(
+            stamp_us=newest,
+            armed=None if heartbeat is None else bool(heartbeat["base_mode"] & _ARMED),
+            # A compass the autopilot does not have is reported as exactly (0, 0, 0).
+            fields={number: field for number, field in fields.items() if any(field)},
+            silent=tuple(
+                number
+                for number, message in _FIELD_MESSAGES.items()
+                if message in kept and message not in rows
+            ),
+            attitude=None if attitude is None else _vector(attitude, ("roll", "pitch", "yaw")),
+            throttle=None if hud is None else float(hud["throttle"]) * 0.01,
+            current=_current(rows),
+            voltage=_voltage(rows),
+            height_m=_height(rows),
+            speed=None if hud is None else _finite(hud["groundspeed"]),
+            compass_trouble=_compass_trouble(rows.get(Message.SYS_STATUS)),
+        )
+
+
+def _is_of_interest(message: int, frame: bytes) -> bool:
+    """Leave out second batteries: the compensation multiplies by the first."""
+    return message != Message.BATTERY_STATUS or int(decoded(frame, message)["id"]) == 0
+
+
+def decoded(frame: bytes, message: int) -> Any:
+    """One frame's fields, by the names of its message."""
+    fields = layout(message)
+    header = 6 if frame[0] == 0xFE else 10
+    payload = frame[header : header + frame[1]][: fields.itemsize].ljust(fields.itemsize, b"\0")
+    return np.frombuffer(payload, fields)[0]
+
+
+def _vector(row: Any, names: tuple[str, str, str]) -> Vector:
+    x, y, z = (float(row[name]) for name in names)
+    return x, y, z
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def _current(rows: Mapping[int, Any]) -> float | None:
+    """Amperes of battery 0; both messages count in 10 mA and say −1 where there is no sensor."""
+    for message in (Message.BATTERY_STATUS, Message.SYS_STATUS):
+        row = rows.get(message)
+        if row is not None and row["current_battery"] >= 0:
+            return float(row["current_battery"]) * 0.01
+    return None
+
+
+def _voltage(rows: Mapping[int, Any]) -> float | None:
+    row = rows.get(Message.SYS_STATUS)
+    if row is None or row["voltage_battery"] in (0, 0xFFFF):
+        return None
+    return float(row["voltage_battery"]) * 1e-3
+
+
+def _height(rows: Mapping[int, Any]) -> float | None:
+    position = rows.get(Message.GLOBAL_POSITION_INT)
+    return None if position is None else float(position["relative_alt"]) * 1e-3
+
+
+def _compass_trouble(row: Any) -> bool:
+    if row is None:
+        return False
+    enabled = int(row["onboard_control_sensors_enabled"]) & _SENSOR_COMPASS
+    healthy = int(row["onboard_control_sensors_health"]) & _SENSOR_COMPASS
+    return bool(enabled and not healthy)

@@ -1,0 +1,241 @@
+"""The quantities of a Recording from the columns of its messages, in the model's units."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from magcomp.model import FloatArray, ParameterChange, ParameterHistory, Series
+from magcomp.sources.columns import Message, Table, text
+
+STANDARD_GRAVITY = 9.80665
+OUTPUTS = 16
+
+_ABSENT_CURRENT = -1
+_ABSENT_UINT16 = 0xFFFF
+_FULL_THROTTLE = 100
+_FIX_3D = 3
+
+# MAV_PARAM_TYPE of integers; PX4 sends their bytes in the place of the float.
+_INTEGER_TYPES = {1: "<u1", 2: "<i1", 3: "<u2", 4: "<i2", 5: "<u4", 6: "<i4"}
+
+_SIMULATION_PREFIX = "SIM_"
+
+# "ArduCopter V4.6.3 (92b0cd78)", "APM:Copter V3.4-dev (bdddfae5)"
+_BANNER = re.compile(r"^(?:Ardu|APM:)\w+ V(\d+\.\d+(?:\.\d+)?[\w.-]*)")
+
+
+class Timed(NamedTuple):
+    """A message's columns in order of time; both shape (n,)."""
+
+    time: FloatArray
+    table: Table
+
+
+Messages = Mapping[int, Timed]
+
+
+def columns(table: Table, *names: str) -> FloatArray:
+    """Some fields side by side, shape (n, number of names)."""
+    result = np.empty((len(table), len(names)))
+    for index, name in enumerate(names):
+        result[:, index] = table[name]
+    return result
+
+
+def field(messages: Messages) -> dict[int, Series]:
+    """Each compass's field in mGauss by compass number; (0, 0, 0) means that none was read."""
+    first = Message.RAW_IMU if Message.RAW_IMU in messages else Message.SCALED_IMU
+    found = {}
+    for compass, message in enumerate((first, Message.SCALED_IMU2, Message.SCALED_IMU3), start=1):
+        if message in messages:
+            time, table = messages[message]
+            value = columns(table, "xmag", "ymag", "zmag")
+            series = _series(time, value, (value != 0).any(axis=1))
+            if series is not None:
+                found[compass] = series
+    return found
+
+
+def gyro(messages: Messages) -> Series | None:
+    """Body rates in rad/s from mrad/s."""
+    return _first_imu(messages, ("xgyro", "ygyro", "zgyro"), 1e-3)
+
+
+def accel(messages: Messages) -> Series | None:
+    """Specific force in m/s² from thousandths of standard gravity."""
+    return _first_imu(messages, ("xacc", "yacc", "zacc"), STANDARD_GRAVITY / 1000)
+
+
+def attitude(messages: Messages) -> Series | None:
+    """Roll, pitch, yaw in radians; rows that are not finite are left out."""
+    if Message.ATTITUDE not in messages:
+        return None
+    time, table = messages[Message.ATTITUDE]
+    value = columns(table, "roll", "pitch", "yaw")
+    return _series(time, value, np.isfinite(value).all(axis=1))
+
+
+def throttle(messages: Messages) -> Series | None:
+    """Thrust demand 0 … 1 from whole per cent; more than 100 % means that it is not known."""
+    if Message.VFR_HUD not in messages:
+        return None
+    time, table = messages[Message.VFR_HUD]
+    percent = table["throttle"]
+    return _series(time, percent / float(_FULL_THROTTLE), percent <= _FULL_THROTTLE)
+
+
+def current(messages: Messages) -> Series | None:
+    """Amperes of the first battery from units of 10 mA."""
+    return _fuller(
+        _first_battery(messages, "current_battery"), _system_status(messages, "current_battery")
+    )
+
+
+def voltage(messages: Messages) -> Series | None:
+    """Volts of the first battery from millivolts."""
+    return _fuller(_cell_sum(messages), _system_status(messages, "voltage_battery"))
+
+
+def outputs(messages: Messages) -> Series | None:
+    """Servo outputs in microseconds, shape (n, 16); MAVLink 1 has the first eight."""
+    if Message.SERVO_OUTPUT_RAW not in messages:
+        return None
+    time, table = messages[Message.SERVO_OUTPUT_RAW]
+    value = columns(table, *(f"servo{n}_raw" for n in range(1, OUTPUTS + 1)))
+    value[value == _ABSENT_UINT16] = 0
+    return _series(time, value, table["port"] == 0)
+
+
+def position(messages: Messages) -> Series | None:
+    """Latitude and longitude in degrees, altitude in m, of the estimate or else of the GPS."""
+    if Message.GLOBAL_POSITION_INT in messages:
+        time, table = messages[Message.GLOBAL_POSITION_INT]
+        known = (table["lat"] != 0) | (table["lon"] != 0)
+        series = _series(time, _degrees_and_metres(table), known)
+        if series is not None:
+            return series
+    if Message.GPS_RAW_INT not in messages:
+        return None
+    time, table = messages[Message.GPS_RAW_INT]
+    return _series(time, _degrees_and_metres(table), table["fix_type"] >= _FIX_3D)
+
+
+def parameters(messages: Messages, autopilot: str, simulation: bool) -> list[ParameterChange]:
+    """Every value reported, in order of time. Not finite ones stay: they are refused by name.
+
+    ArduPilot casts integers to float; PX4 puts their bytes in its place.
+
+    Parameters
+    ----------
+    messages
+        One vehicle's messages.
+    autopilot
+        ``"ardupilot"`` or ``"px4"``.
+    simulation
+        True for the SIM_* parameters alone, False for all others.
+    """
+    if Message.PARAM_VALUE not in messages:
+        return []
+    time, table = messages[Message.PARAM_VALUE]
+    value = table["param_value"].astype(np.float64)
+    if autopilot == "px4":
+        raw = np.ascontiguousarray(table["param_value"]).view(np.uint8).reshape(-1, 4)
+        for kind, code in _INTEGER_TYPES.items():
+            rows = table["param_type"] == kind
+            width = np.dtype(code).itemsize
+            value[rows] = np.ascontiguousarray(raw[rows, :width]).view(code)[:, 0]
+    rows = zip(time.tolist(), text(table["param_id"]), value.tolist(), strict=True)
+    # tuple.__new__ spares a Python call for each of a log's thousand parameters.
+    return [
+        tuple.__new__(ParameterChange, row)
+        for row in rows
+        if row[1].startswith(_SIMULATION_PREFIX) is simulation
+    ]
+
+
+def firmware(messages: Messages) -> str:
+    """Version such as "4.6.3" as last reported; empty where it was not."""
+    if Message.AUTOPILOT_VERSION in messages:
+        version = int(messages[Message.AUTOPILOT_VERSION].table["flight_sw_version"][-1])
+        if version:
+            return f"{version >> 24}.{version >> 16 & 0xFF}.{version >> 8 & 0xFF}"
+    if Message.STATUSTEXT in messages:
+        for line in reversed(text(messages[Message.STATUSTEXT].table["text"])):
+            banner = _BANNER.match(line)
+            if banner:
+                return banner.group(1)
+    return ""
+
+
+def device_ids(parameters: ParameterHistory) -> tuple[int, ...]:
+    """COMPASS_DEV_ID, 2 and 3 as last reported, without those that are 0."""
+    values = (parameters.last(f"COMPASS_DEV_ID{n}", 0.0) for n in ("", 2, 3))
+    return tuple(int(value) for value in values if np.isfinite(value) and value)
+
+
+def unix_offset(messages: Messages) -> float:
+    """Unix time of time zero by the vehicle's own calendar; NaN where it has none."""
+    if Message.SYSTEM_TIME not in messages:
+        return float("nan")
+    time, table = messages[Message.SYSTEM_TIME]
+    known = table["time_unix_usec"] > 0
+    if not known.any():
+        return float("nan")
+    return float(np.median(table["time_unix_usec"][known] / 1e6 - time[known]))
+
+
+def _series(time: FloatArray, value: FloatArray, rows: Any) -> Series | None:
+    if rows.all() and len(rows):
+        return Series(time, value)
+    return Series(time[rows], value[rows]) if rows.any() else None
+
+
+def _first_imu(messages: Messages, names: tuple[str, ...], unit: float) -> Series | None:
+    for message in (Message.RAW_IMU, Message.SCALED_IMU):
+        if message in messages:
+            time, table = messages[message]
+            return Series(time, columns(table, *names) * unit)
+    return None
+
+
+def _degrees_and_metres(table: Table) -> FloatArray:
+    return columns(table, "lat", "lon", "alt") * (1e-7, 1e-7, 1e-3)
+
+
+def _first_battery(messages: Messages, name: str) -> Series | None:
+    if Message.BATTERY_STATUS not in messages:
+        return None
+    time, table = messages[Message.BATTERY_STATUS]
+    rows = (table["id"] == 0) & (table[name] != _ABSENT_CURRENT)
+    return _series(time, table[name] / 100.0, rows)
+
+
+def _system_status(messages: Messages, name: str) -> Series | None:
+    if Message.SYS_STATUS not in messages:
+        return None
+    time, table = messages[Message.SYS_STATUS]
+    if name == "current_battery":
+        return _series(time, table[name] / 100.0, table[name] != _ABSENT_CURRENT)
+    return _series(time, table[name] / 1000.0, table[name] != _ABSENT_UINT16)
+
+
+def _cell_sum(messages: Messages) -> Series | None:
+    if Message.BATTERY_STATUS not in messages:
+        return None
+    time, table = messages[Message.BATTERY_STATUS]
+    cells: NDArray[Any] = table["voltages"]
+    present = cells != _ABSENT_UINT16
+    total = np.where(present, cells, 0).sum(axis=1) + table["voltages_ext"].sum(axis=1)
+    return _series(time, total / 1000.0, (table["id"] == 0) & present.any(axis=1))
+
+
+def _fuller(battery: Series | None, system: Series | None) -> Series | None:
+    """The series with more rows; the battery's own where both have as many."""
+    if battery is None or system is None:
+        return battery or system
+    return battery if len(battery) >= len(system) else system

@@ -1,0 +1,61 @@
+"""Find frames that stand in a log twice, because a block of it was copied or sent again."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from magcomp.sources.checksum import OffsetArray
+from magcomp.sources.clock import NO_STAMP
+from magcomp.sources.frames import Frames, MaskArray
+
+# Odd, so that no two keys are mixed alike; large, so that neighbouring ones end far apart.
+_MIX = np.int64(0x1E3779B97F4A7C15)
+
+
+def repeated(frames: Frames, stamp: OffsetArray) -> MaskArray:
+    """Which frames of one vehicle are copies of an earlier one, shape (n,).
+
+    Same message, sequence number and checksum, and either the same time of the vehicle or the
+    same time of the recorder. A frame without the vehicle's time is a copy under another
+    recorder's time only next to a copied frame that has one: heartbeats, say, truly repeat
+    every 256 frames.
+
+    Parameters
+    ----------
+    frames
+        In the order of the stream, shape (n,).
+    stamp
+        The vehicle's time as sent, or ``NO_STAMP``, shape (n,).
+    """
+    content = (
+        (frames.message.astype(np.int64) << 24)
+        | (frames.sequence.astype(np.int64) << 16)
+        | frames.checksum
+    )
+    stamped = stamp != NO_STAMP
+    copies = _seen_before(np.where(stamped, stamp, frames.arrival), content)
+    copied = copies & stamped
+    if copied.any():
+        anchors = np.flatnonzero(stamped)
+        bare = np.flatnonzero(~stamped)
+        after = np.searchsorted(anchors, bare)
+        beside = copied[anchors[np.minimum(after, len(anchors) - 1)]] & (after < len(anchors))
+        beside |= copied[anchors[np.maximum(after - 1, 0)]] & (after > 0)
+        copies[bare] |= beside & _seen_before(content[bare], content[bare])
+    return copies
+
+
+def _seen_before(key: OffsetArray, content: OffsetArray) -> MaskArray:
+    """Which rows equal an earlier row in both arrays, shape (n,)."""
+    result = np.zeros(len(key), dtype=bool)
+    # Equal rows have equal mixtures; sorting those alone is fast and nearly always settles it.
+    mixture = key * _MIX + content
+    ordered = np.sort(mixture)
+    doubtful = ordered[1:][ordered[1:] == ordered[:-1]]
+    if not len(doubtful):
+        return result
+    rows = np.flatnonzero(np.isin(mixture, doubtful))
+    ranked = rows[np.lexsort((content[rows], key[rows]))]
+    twice = (key[ranked][1:] == key[ranked][:-1]) & (content[ranked][1:] == content[ranked][:-1])
+    result[ranked[1:][twice]] = True
+    return result

@@ -1,0 +1,46 @@
+"""Open a log's bytes without loading them."""
+
+from __future__ import annotations
+
+import mmap
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from magcomp.errors import LogError
+from magcomp.sources.checksum import ByteArray
+
+
+@contextmanager
+def mapped(path: str | Path) -> Iterator[ByteArray]:
+    """Bytes of a file, brought into memory by the operating system as they are touched.
+
+    Nothing that outlives the block may refer to the array.
+
+    Raises
+    ------
+    LogError
+        There is no such file, it is not a regular file, or it cannot be read.
+    """
+    content = _map(Path(path))
+    # Arrays still refer to the mapping when a caller's error is on its way; it closes with them.
+    yield np.frombuffer(content, dtype=np.uint8)
+
+
+def _map(path: Path) -> mmap.mmap | bytes:
+    try:
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode):
+            what = "a directory" if stat.S_ISDIR(status.st_mode) else "something that is no file"
+            raise LogError(f"Log {path} must be a file; instead received {what}.")
+        if not status.st_size:
+            return b""
+        with path.open("rb") as file:
+            return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+    except FileNotFoundError:
+        raise LogError(f"Log {path} must exist; instead found no such file.") from None
+    except (OSError, ValueError) as error:
+        raise LogError(f"Log {path} must be readable; instead received: {error}.") from error

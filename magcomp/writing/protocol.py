@@ -1,0 +1,402 @@
+"""Writing a compass calibration so that no half of it is ever in force. No I/O, no clock.
+
+Stages and what leaves them
+---------------------------
+======== ======================================= ======= ========== ==================
+stage    sends, a window at a time               then    on silence another value
+======== ======================================= ======= ========== ==================
+COMPARE  a read of identity and all old values   OFF     over       over
+OFF      a write of 0 to the switches            WRITE   OFF        OFF
+WRITE    a write of each value still to confirm  VERIFY  OFF        OFF
+VERIFY   a read of all values, switches still 0  ON      roll back  SETTLE
+ON       one write of the target's switches      CONFIRM a read     VERIFY
+CONFIRM  a read of the switches                  OVER    roll back  SETTLE
+SETTLE   nothing until all sent before has come  IDENTIFY
+IDENTIFY a read of the identity                  OFF     roll back  over
+OVER     nothing
+======== ======================================= ======= ========== ==================
+
+Patience is bounded everywhere; where it ends, a vehicle not yet touched is left
+alone and any other is rolled back. The target is the new set; rolling back is
+the same road with the old set as target, entered at SETTLE.
+
+Rules
+-----
+1. At every instant the vehicle holds all-old, or all-new, or its switches are
+   0: values change only between OFF and ON, and each stage ends only when
+   everything in it was confirmed.
+2. Nothing is written unless a heartbeat not older than ``heartbeat_gap`` says
+   disarmed. A vehicle that is armed gets no further write, not even the old
+   values.
+3. A write counts when a PARAM_VALUE carries exactly its float32, whatever its
+   index. An echo of another value may be stale, or a sibling's (setting _X
+   echoes _Y and _Z): it is counted, not believed, and the write repeated
+   together with a read, because ArduPilot answers an unknown name with silence.
+4. ArduPilot stores a write some time after its echo, in order; a reboot may
+   take the newest back. Silence may be such a reboot. So after silence no
+   value is written before the switches are confirmed 0 anew, and no switch
+   before the values are: only reads and OFF are simply repeated. CONFIRM
+   waits ``storing`` seconds before it asks.
+5. Boot time going back, or a gap in the heartbeat, may be a reboot or another
+   vehicle: nothing known before counts. SETTLE, and identity is read again.
+6. Whoever delays messages, delays them at most ``quiet`` seconds. So SETTLE
+   waits that long, and so does WRITE after an OFF that had to be repeated: a
+   late copy of an old write cannot undo a newer one unseen.
+7. Refusal, silence, a lost link and a request to stop roll back, once.
+   A roll-back that fails leaves the switches 0 where they had been confirmed.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import replace
+
+from magcomp.writing.events import (
+    Event,
+    Intends,
+    Mismatch,
+    Outcome,
+    Progress,
+    Reason,
+    Restarted,
+    RollingBack,
+    Stage,
+    Standing,
+    Written,
+)
+from magcomp.writing.exchange import Exchange, Timing
+from magcomp.writing.files import format_value
+from magcomp.writing.messages import (
+    REAL32,
+    Incoming,
+    Outgoing,
+    ParamRefused,
+    ParamValue,
+    ReadName,
+    SetValue,
+    fits,
+)
+from magcomp.writing.plan import WritePlan
+from magcomp.writing.watch import VehicleWatch
+
+_NEXT = {
+    Stage.COMPARE: Stage.OFF,
+    Stage.OFF: Stage.WRITE,
+    Stage.WRITE: Stage.VERIFY,
+    Stage.VERIFY: Stage.ON,
+    Stage.ON: Stage.CONFIRM,
+    Stage.CONFIRM: Stage.OVER,
+    Stage.SETTLE: Stage.IDENTIFY,
+    Stage.IDENTIFY: Stage.OFF,
+}
+_WRITING = frozenset({Stage.OFF, Stage.WRITE, Stage.ON})
+_ROUNDS = frozenset({Stage.OFF, Stage.WRITE})  # written once, then all over again from OFF
+_BELIEVED_READS = 2
+_BELIEVED_ECHOES = 12  # at 30 % loss a good write is lost that often once in 10⁶
+_GATE = 0.2
+
+
+class WriteSequence:
+    """Drives a vehicle from all-old to all-new, or back; see the top of the file.
+
+    Parameters
+    ----------
+    plan
+        What to write, and where.
+    now
+        The time, in seconds from anywhere.
+    timing
+        Patience.
+
+    Attributes
+    ----------
+    stage
+        See the table at the top of the file.
+    outcome
+        How it ended; None before.
+    """
+
+    def __init__(self, plan: WritePlan, *, now: float, timing: Timing | None = None) -> None:
+        self._plan = plan
+        self._timing = timing or Timing()
+        self._values: Mapping[str, float] = plan.new
+        self._switches: Mapping[str, float] = plan.switches
+        self._rolling_back: RollingBack | None = None
+        self._events: list[Event] = []
+        self._types: dict[str, int] = {}
+        self._expected: Mapping[str, float] = {}
+        self._exchange: Exchange[str] = Exchange((), self._timing)
+        self._watch = VehicleWatch(now, self._timing)
+        self._not_before = now
+        self._unconfirmed: dict[str, float] = {}
+        self._rounds: Counter[Stage] = Counter()
+        self._other_values: Counter[str] = Counter()
+        self._restarts = 0
+        self._repeats = False
+        self._touched = False
+        self._switched_off = False
+        self.outcome: Outcome | None = None
+        self.stage = Stage.COMPARE
+        self._begin_values()
+        self._enter(Stage.COMPARE, now)
+
+    @property
+    def finished(self) -> bool:
+        """Whether nothing more will happen."""
+        return self.stage is Stage.OVER
+
+    def handle(self, message: Incoming, now: float) -> None:
+        """Take what the vehicle said."""
+        if self.finished:
+            return
+        interruption = self._watch.hear(message, now)
+        if self._watch.armed:
+            self._end(Reason.ARMED, "the vehicle is armed")
+        elif interruption:
+            self._restart(Reason.LINK_LOST, interruption, now)
+        elif isinstance(message, ParamValue):
+            self._take_value(message, now)
+        elif isinstance(message, ParamRefused) and self._exchange.differ(message.name):
+            self._fail(Reason.REFUSED, f"{message.name} was not taken: {message.reason}", now)
+
+    def poll(self, now: float) -> tuple[list[Event], list[Outgoing]]:
+        """Tell what has happened, then what is to be sent.
+
+        Journals must have the events on the disk before the messages are sent.
+        """
+        self._check_patience(now)
+        while not self.finished and self._is_complete(now):
+            self._leave(now)
+        if self.stage in _ROUNDS and self._exchange.unanswered(now):
+            self._break_off_round(now)
+        outgoing = [] if self.finished else self._ask(now)
+        events, self._events = self._events, []
+        return events, outgoing
+
+    def wake(self, now: float) -> float:
+        """When to poll next, if nothing arrives before."""
+        if not self._exchange.open:
+            due = max(now, self._not_before)
+        elif self._gate_closed(now):
+            due = max(now + _GATE, self._not_before)
+        else:
+            due = self._exchange.wake(now)
+        return min(due, self._watch.silent_from)
+
+    def stop(
+        self, now: float, reason: Reason = Reason.STOPPED, why: str = "it was interrupted"
+    ) -> None:
+        """End because the user asks, or must: untouched, or by rolling back."""
+        if not self.finished and self._rolling_back is None:
+            self._fail(reason, why, now)
+
+    def abandon(self, why: str) -> None:
+        """End at once, because the link cannot be used any more."""
+        if not self.finished:
+            self._end(Reason.LINK_LOST, why)
+
+    def _take_value(self, message: ParamValue, now: float) -> None:
+        name = message.name
+        wanted = self._expected.get(name)
+        if wanted is None:
+            return
+        if message.value != wanted:
+            self._take_other_value(name, message.value, now)
+            return
+        if not self._exchange.answer(name):
+            return
+        self._types[name] = message.type
+        if self.stage in _WRITING:
+            self._events.append(Written(name, wanted))
+        if self.stage is Stage.WRITE:
+            del self._unconfirmed[name]
+            self._rounds[Stage.WRITE] = 0
+        done, total = self._exchange.answered, self._exchange.total
+        self._events.append(Progress(self.stage, name, done, total))
+
+    def _take_other_value(self, name: str, value: float, now: float) -> None:
+        count = self._exchange.differ(name)
+        if count == 0:
+            return
+        if self.stage not in _WRITING:
+            if count >= _BELIEVED_READS:
+                self._believe(name, value, now)
+            return
+        repeated = self._exchange.attempts(name) > 1
+        if count == self._exchange.attempts(name):
+            self._other_values[name] += 1
+        if self._other_values[name] >= _BELIEVED_ECHOES:
+            self._believe(name, value, now)
+        elif self.stage is Stage.ON and repeated:
+            # The one write was lost: the values first, then the switch again.
+            self._enter(Stage.VERIFY, now)
+
+    def _believe(self, name: str, value: float, now: float) -> None:
+        wanted = self._expected[name]
+        why = (
+            f"{name} must read back as {format_value(wanted)}; "
+            f"instead received {format_value(value)}"
+        )
+        self._events.append(Mismatch(name, wanted, value))
+        if name in self._plan.identity:
+            self._end(Reason.ANOTHER_VEHICLE, why)
+        elif self.stage is Stage.COMPARE:
+            self._end(Reason.CHANGED, f"{why} (it changed since the backup)")
+        elif self.stage in _WRITING:
+            self._fail(Reason.MISMATCH, why, now)
+        else:
+            self._restart(Reason.MISMATCH, why, now)
+
+    def _check_patience(self, now: float) -> None:
+        if self.finished:
+            return
+        silence, limit = self._timing.silence, self._timing.limit
+        silent = () if self.stage in _ROUNDS else self._exchange.unanswered(now)
+        if self._watch.is_silent(now):
+            self._fail(Reason.LINK_LOST, f"nothing was heard for {silence:.0f} s", now)
+        elif self._watch.is_overdue(now):
+            self._fail(Reason.TIMEOUT, f"the write did not end within {limit:.0f} s", now)
+        elif (
+            self.stage in _WRITING
+            and self._gate_closed(now)
+            and self._watch.is_without_heartbeat(now)
+        ):
+            self._fail(Reason.LINK_LOST, f"no heartbeat came for {silence:.0f} s", now)
+        elif silent:
+            why = f"{silent[0]} was not answered in {self._timing.attempts} attempts"
+            self._fail(Reason.TIMEOUT, why, now)
+
+    def _enter(self, stage: Stage, now: float) -> None:
+        off = dict.fromkeys(self._switches, 0.0)
+        on = {name: value for name, value in self._switches.items() if value != 0.0}
+        used = [n for n, v in self._plan.switches.items() if v != 0.0 or self._plan.old[n] != 0.0]
+        expected: dict[Stage, Mapping[str, float]] = {
+            Stage.COMPARE: {**self._plan.identity, **self._plan.old},
+            Stage.IDENTIFY: self._plan.identity,
+            Stage.OFF: dict.fromkeys(used, 0.0),
+            Stage.WRITE: dict(self._unconfirmed),
+            Stage.VERIFY: {**off, **self._values},
+            Stage.ON: on,
+            Stage.CONFIRM: {**self._switches, **({} if on else self._values)},
+        }
+        self.stage = stage
+        self._expected = expected.get(stage, {})
+        timing = replace(self._timing, attempts=1) if stage in _ROUNDS else self._timing
+        self._exchange = Exchange(self._expected, timing)
+        if stage is Stage.SETTLE:
+            self._begin_values()
+            self._not_before = now + self._timing.quiet
+        if stage is Stage.CONFIRM:
+            self._not_before = now + self._timing.storing
+        if stage in _WRITING and self._expected:
+            self._events.append(Intends(stage, dict(self._expected)))
+
+    def _begin_values(self) -> None:
+        self._unconfirmed = dict(self._values)
+        self._rounds.clear()
+        self._other_values.clear()
+
+    def _is_complete(self, now: float) -> bool:
+        if self._exchange.open:
+            return False
+        return self.stage not in {Stage.SETTLE, Stage.WRITE} or now >= self._not_before
+
+    def _leave(self, now: float) -> None:
+        if self.stage is Stage.COMPARE and not self._all_fit():
+            return
+        if self.stage is Stage.CONFIRM:
+            self._complete()
+            return
+        self._switched_off = self.stage in _ROUNDS
+        if self.stage is Stage.OFF:
+            self._rounds[Stage.OFF] = 0
+        self._enter(_NEXT[self.stage], now)
+
+    def _break_off_round(self, now: float) -> None:
+        self._exchange.halt()
+        if not self._exchange.idle(now):
+            return
+        self._rounds[self.stage] += 1
+        rounds = self._rounds[self.stage]
+        if rounds >= self._timing.attempts:
+            why = f"{self._exchange.open[0]} was not confirmed in {rounds} attempts"
+            self._fail(Reason.TIMEOUT, why, now)
+            return
+        if self.stage is Stage.OFF:
+            self._not_before = now + self._timing.quiet
+        self._switched_off = False
+        self._repeats = True
+        self._enter(Stage.OFF, now)
+
+    def _all_fit(self) -> bool:
+        for name, value in {**self._values, **self._switches}.items():
+            if not fits(value, self._types[name]):
+                self._end(Reason.REFUSED, f"{name} cannot hold {format_value(value)}")
+                return False
+        return True
+
+    def _ask(self, now: float) -> list[Outgoing]:
+        if self._gate_closed(now):
+            return []
+        outgoing: list[Outgoing] = []
+        for name, attempt in self._exchange.ask(now):
+            again = attempt > 1 or (self._repeats and self.stage in _ROUNDS)
+            if self.stage in _ROUNDS or (self.stage is Stage.ON and attempt == 1):
+                self._touched = True
+                kind = self._types.get(name, REAL32)
+                outgoing.append(SetValue(name, self._expected[name], kind))
+            if self.stage not in _WRITING or again:
+                outgoing.append(ReadName(name))
+        return outgoing
+
+    def _gate_closed(self, now: float) -> bool:
+        """Whether a write waits for a heartbeat that says disarmed, or CONFIRM for the storage."""
+        if self.stage is Stage.CONFIRM:
+            return now < self._not_before
+        return self.stage in _WRITING and not self._watch.is_known_disarmed(now)
+
+    def _restart(self, reason: Reason, why: str, now: float) -> None:
+        self._restarts += 1
+        if self._restarts > self._timing.restarts:
+            self._fail(reason, why, now)
+            return
+        self._events.append(Restarted(why))
+        self._switched_off = False
+        self._enter(Stage.SETTLE if self._touched else Stage.COMPARE, now)
+
+    def _fail(self, reason: Reason, why: str, now: float) -> None:
+        if not self._touched or self._rolling_back is not None:
+            self._end(reason, why)
+            return
+        self._rolling_back = RollingBack(reason, why)
+        self._events.append(self._rolling_back)
+        self._values = {name: self._plan.old[name] for name in self._plan.new}
+        self._switches = {name: self._plan.old[name] for name in self._plan.switches}
+        self._watch.renew(now)
+        self._restarts = 0
+        self._enter(Stage.SETTLE, now)
+
+    def _complete(self) -> None:
+        if self._rolling_back is None:
+            self._finish(Outcome(Standing.NEW))
+        else:
+            self._finish(Outcome(Standing.OLD, self._rolling_back.reason, self._rolling_back.why))
+
+    def _end(self, reason: Reason, why: str) -> None:
+        """End without writing anything more."""
+        if not self._touched:
+            standing = Standing.OLD
+        else:
+            standing = Standing.OFF if self._switched_off else Standing.UNSURE
+        if self._rolling_back is not None and reason is not Reason.ARMED:
+            why = f"{self._rolling_back.why}; the roll-back failed as well: {why}"
+            reason = self._rolling_back.reason
+        self._finish(Outcome(standing, reason, why))
+
+    def _finish(self, outcome: Outcome) -> None:
+        self.outcome = outcome
+        self._events.append(outcome)
+        self.stage = Stage.OVER
+        self._expected = {}
+        self._exchange = Exchange((), self._timing)

@@ -1,0 +1,313 @@
+"""From a plan to a vehicle that holds it: backup, journal, write, verify, roll back.
+
+The protocol decides (protocol.py, reader.py); this file joins it to a link, a
+clock and the disk.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Protocol, TypeVar
+
+from magcomp.errors import (
+    LinkError,
+    LinkTimeoutError,
+    MagcompError,
+    OutputError,
+    VehicleRefusedError,
+    WriteError,
+)
+from magcomp.model import ParameterSet, Vehicle
+from magcomp.writing.events import Event, Outcome, Reason, Standing
+from magcomp.writing.exchange import Timing
+from magcomp.writing.files import write_parameter_file
+from magcomp.writing.journal import Journal
+from magcomp.writing.messages import Incoming, Outgoing, Peer, decode, encode
+from magcomp.writing.plan import WritePlan, relevant_names
+from magcomp.writing.protocol import WriteSequence
+from magcomp.writing.reader import ParameterReader, ReadProgress
+
+_LONGEST_WAIT = 0.2  # seconds until a request to stop is seen
+
+E_co = TypeVar("E_co", covariant=True)
+E = TypeVar("E")
+
+
+class Connection(Protocol):
+    """What a link must do: pymavlink messages, one at a time."""
+
+    def send(self, message: Any) -> None:
+        """Send a message, or lose it.
+
+        Raises
+        ------
+        LinkError
+            Where no message can be sent any more.
+        """
+        ...
+
+    def receive(self, timeout: float) -> Any | None:
+        """Next message, or None where none came within ``timeout`` seconds.
+
+        Raises
+        ------
+        LinkError
+            Where no message can come any more.
+        """
+        ...
+
+
+class Machine(Protocol[E_co]):
+    """What `run` drives: `ParameterReader` or `WriteSequence`."""
+
+    @property
+    def finished(self) -> bool:
+        """Whether nothing more will happen."""
+        ...
+
+    def handle(self, message: Incoming, now: float) -> None:
+        """Take what the vehicle said."""
+        ...
+
+    def poll(self, now: float) -> tuple[Sequence[E_co], Sequence[Outgoing]]:
+        """Tell what is to be reported, then what is to be sent."""
+        ...
+
+    def wake(self, now: float) -> float:
+        """When to poll next, if nothing arrives before."""
+        ...
+
+    def stop(self, now: float) -> None:
+        """End because the user asks."""
+        ...
+
+
+def _ignore(_: object) -> None:
+    pass
+
+
+def _never() -> bool:
+    return False
+
+
+def run(
+    machine: Machine[E],
+    connection: Connection,
+    peer: Peer,
+    *,
+    clock: Callable[[], float],
+    on_events: Callable[[Sequence[E]], None] = _ignore,
+    stop: Callable[[], bool] = _never,
+) -> None:
+    """Drive a machine until it has finished; may be called again after an exception.
+
+    Parameters
+    ----------
+    machine
+        Decides what is sent.
+    connection
+        Carries it.
+    peer
+        The vehicle; other systems' messages are ignored.
+    clock
+        Seconds from anywhere, never going back.
+    on_events
+        Gets the events of each step before its messages are sent.
+    stop
+        Asked all the time whether to end.
+
+    Raises
+    ------
+    LinkError
+        Where the connection is lost for good.
+    """
+    while True:
+        if stop():
+            machine.stop(clock())
+        events, outgoing = machine.poll(clock())
+        if events:
+            on_events(events)
+        for message in outgoing:
+            connection.send(encode(message, peer))
+        if machine.finished:
+            return
+        now = clock()
+        received = connection.receive(min(max(machine.wake(now) - now, 0.0), _LONGEST_WAIT))
+        incoming = None if received is None else decode(received, peer)
+        if incoming is not None:
+            machine.handle(incoming, clock())
+
+
+def fetch(
+    connection: Connection,
+    vehicle: Vehicle,
+    names: Iterable[str] | None = None,
+    *,
+    clock: Callable[[], float],
+    on_event: Callable[[ReadProgress], None] = _ignore,
+    timing: Timing | None = None,
+) -> Mapping[str, float]:
+    """Read all parameters of a vehicle, or those of `names` that it knows.
+
+    Raises
+    ------
+    LinkTimeoutError
+        Where the vehicle does not answer.
+    LinkError
+        Where the connection is lost for good.
+    """
+    reader = ParameterReader(names, now=clock(), timing=timing)
+
+    def tell(events: Sequence[ReadProgress]) -> None:
+        for event in events:
+            on_event(event)
+
+    run(reader, connection, Peer.of(vehicle), clock=clock, on_events=tell)
+    if reader.failure:
+        raise LinkTimeoutError(
+            f"system {vehicle.system} must send its parameters; instead {reader.failure}"
+        )
+    return reader.values
+
+
+def read_current(
+    connection: Connection,
+    vehicle: Vehicle,
+    wanted: ParameterSet,
+    *,
+    clock: Callable[[], float],
+    on_event: Callable[[ReadProgress], None] = _ignore,
+    timing: Timing | None = None,
+) -> Mapping[str, float]:
+    """Read what `plan` must know of a vehicle: its compass calibration, by name.
+
+    Raises
+    ------
+    LinkTimeoutError
+        Where the vehicle does not answer.
+    LinkError
+        Where the connection is lost for good.
+    """
+    names = relevant_names(vehicle.autopilot, wanted)
+    return fetch(connection, vehicle, names, clock=clock, on_event=on_event, timing=timing)
+
+
+def write(
+    plan: WritePlan,
+    connection: Connection,
+    *,
+    backup: Path,
+    clock: Callable[[], float],
+    on_event: Callable[[Event], None] = _ignore,
+    stop: Callable[[], bool] = _never,
+    timing: Timing | None = None,
+) -> Outcome:
+    """Write a plan to the vehicle and verify it, or put everything back.
+
+    The backup and its journal are on the disk before the first write. Ctrl-C,
+    or `stop`, rolls back; a second Ctrl-C gives up at once.
+
+    Parameters
+    ----------
+    plan
+        What to write. Where nothing differs, nothing is written, no file either.
+    backup
+        Parameter file to be created; restore from it with a plan of its content.
+    on_event
+        Told everything as it happens.
+
+    Returns
+    -------
+    Outcome
+        See `raise_for_failure`.
+
+    Raises
+    ------
+    OutputError
+        Where backup or journal cannot be created; then the vehicle is untouched.
+    KeyboardInterrupt
+        At the second Ctrl-C; `read_journal` tells what stands.
+    """
+    if not plan.changes:
+        return Outcome(Standing.NEW)
+    write_parameter_file(backup, plan.backup)
+    with Journal(backup, plan) as journal:
+        return _drive(plan, connection, journal, clock, on_event, stop, timing)
+
+
+def _drive(
+    plan: WritePlan,
+    connection: Connection,
+    journal: Journal,
+    clock: Callable[[], float],
+    on_event: Callable[[Event], None],
+    stop: Callable[[], bool],
+    timing: Timing | None,
+) -> Outcome:
+    sequence = WriteSequence(plan, now=clock(), timing=timing)
+    journal_works = True
+    interrupted = False
+
+    def tell(events: Sequence[Event]) -> None:
+        if journal_works:
+            journal.record(events)
+        for event in events:
+            on_event(event)
+
+    while sequence.outcome is None:
+        try:
+            run(sequence, connection, Peer.of(plan.vehicle), clock=clock, on_events=tell, stop=stop)
+        except LinkError as error:
+            sequence.abandon(str(error))
+        except OutputError as error:
+            # Without journal nothing new may begin, but what was begun must be undone.
+            journal_works = False
+            sequence.stop(clock(), Reason.JOURNAL, str(error))
+        except KeyboardInterrupt:
+            if interrupted:
+                raise
+            interrupted = True
+            sequence.stop(clock())
+    with contextlib.suppress(OutputError):
+        tell(sequence.poll(clock())[0])
+    return sequence.outcome
+
+
+def raise_for_failure(outcome: Outcome, backup: Path, address: str = "ADDRESS") -> None:
+    """Do nothing for a good outcome; otherwise say what happened, what stands, what to do.
+
+    Raises
+    ------
+    VehicleRefusedError
+        Armed, or another vehicle.
+    LinkError
+        The link was lost.
+    LinkTimeoutError
+        The vehicle answered too little.
+    WriteError
+        A parameter was not taken, or reads back differently; or the write was stopped.
+    """
+    if outcome.reason is None:
+        return
+    kinds: dict[Reason, type[MagcompError]] = {
+        Reason.ARMED: VehicleRefusedError,
+        Reason.ANOTHER_VEHICLE: VehicleRefusedError,
+        Reason.LINK_LOST: LinkError,
+        Reason.TIMEOUT: LinkTimeoutError,
+        Reason.JOURNAL: OutputError,
+    }
+    stands = {
+        Standing.OLD: "the vehicle holds everything as before",
+        Standing.NEW: "the vehicle holds everything as wanted",
+        Standing.OFF: "the vehicle's motor compensation is off and some values are not restored",
+        Standing.UNSURE: (
+            "the vehicle holds everything as before, everything as wanted, "
+            "or has its motor compensation off"
+        ),
+    }
+    text = f"The write failed because {outcome.why}; {stands[outcome.standing]}."
+    if outcome.standing in {Standing.OFF, Standing.UNSURE}:
+        text += f" Bring it back with: magcomp restore {backup} {address}"
+    raise kinds.get(outcome.reason, WriteError)(text)

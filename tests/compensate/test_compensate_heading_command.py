@@ -1,0 +1,121 @@
+"""``magcomp heading``: raw, corrected and fused heading of a log, and the error of each."""
+
+import json
+
+import numpy as np
+import pytest
+from truth import FIXTURES
+
+from magcomp.analysis import Options, analyse
+from magcomp.cli.app import run
+from magcomp.compensate import Tuning, track
+from magcomp.experiments.motion import accuracy
+from magcomp.sources import read
+from magcomp.sources.truth import read_truth
+
+FLIGHT = str(FIXTURES / "flight.tlog")
+
+
+def document(capsys, *arguments):
+    assert run(["heading", *arguments, "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+@pytest.fixture
+def parameters(tmp_path, capsys):
+    """The parameter file of the flight's own fit."""
+    path = tmp_path / "compass.param"
+    assert run(["fit", FLIGHT, "-o", str(path)]) == 0
+    capsys.readouterr()
+    return str(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "fused_rms"),
+    [
+        ("flight", 1.0),
+        ("flight_wrong_mot", 1.0),
+        ("flight_uncalibrated", 1.0),
+        ("mission_uncompensated", 1.5),
+        ("mission_compensated", 1.0),
+        ("turntable_five_levels", 1.5),
+    ],
+)
+def test_correcting_and_fusing_bring_the_heading_to_the_truth(name, fused_rms, capsys):
+    error = document(capsys, str(FIXTURES / f"{name}.tlog"), "--compass", "1")["error_deg"]
+    assert error["fused"]["rms"] < fused_rms
+    assert error["fused"]["max"] < 3.0
+    if name != "mission_compensated":
+        assert error["corrected"]["rms"] < 0.2 * error["raw"]["rms"]
+
+
+def test_headings_are_degrees_of_a_full_turn_at_times_that_never_go_back(capsys):
+    for heading in document(capsys, FLIGHT)["headings"].values():
+        time = np.array(heading["time_s"])
+        known = np.array([value for value in heading["deg"] if value is not None])
+        assert len(time) == len(heading["deg"])
+        assert (np.diff(time) >= 0).all()
+        assert ((known >= 0) & (known <= 360)).all()
+
+
+def test_a_parameter_file_corrects_as_the_fit_it_came_from(parameters, capsys):
+    fitted = document(capsys, FLIGHT)
+    loaded = document(capsys, FLIGHT, "--parameters", parameters)
+    assert loaded["correction"] == {"from": parameters, "regressor": "current"}
+    assert loaded["error_deg"]["corrected"]["rms"] == pytest.approx(
+        fitted["error_deg"]["corrected"]["rms"], abs=0.05
+    )
+
+
+def test_a_correction_in_force_leaves_the_reported_heading_as_it_is(capsys):
+    error = document(capsys, FLIGHT, "--in-force")["error_deg"]
+    assert error["corrected"]["rms"] == pytest.approx(error["raw"]["rms"], abs=0.1)
+
+
+def test_the_text_tells_the_error_and_the_plot_draws_it(capsys):
+    assert run(["heading", FLIGHT, "--plot"]) == 0
+    text = capsys.readouterr().out
+    assert "error against the simulation's truth" in text
+    assert "largest" in text
+    assert "\x1b" not in text
+    assert text.count("┌") == 2
+
+
+def test_both_sources_of_a_correction_at_once_are_refused(parameters, capsys):
+    assert run(["heading", FLIGHT, "--in-force", "--parameters", parameters]) == 2
+    assert "instead received both" in capsys.readouterr().err
+
+
+def test_a_parameter_file_without_a_compass_is_refused(tmp_path, capsys):
+    path = tmp_path / "other.param"
+    path.write_text("WPNAV_SPEED,500\n")
+    assert run(["heading", FLIGHT, "--parameters", str(path)]) == 2
+    assert "must hold COMPASS_ parameters" in capsys.readouterr().err
+
+
+def test_a_log_without_the_control_quantity_of_the_correction_says_so(parameters, capsys):
+    log = str(FIXTURES / "sweep_throttle_only.tlog")
+    assert run(["heading", log, "--parameters", parameters]) == 2
+    assert "must hold the current" in capsys.readouterr().err
+
+
+def test_the_autopilots_attitude_is_a_better_plumb_line_than_the_accelerometer():
+    log = FIXTURES / "mission_compensated.tlog"
+    recording, truth = read(log), read_truth(log)
+    fit = analyse(recording, Options(compass=1)).compasses[0].fit
+    rms = {}
+    for gravity in ("attitude", "accelerometer"):
+        fused = track(recording, 1, fit.correction, fit.regressor, gravity=gravity).fused
+        rms[gravity] = accuracy(truth, fused.time, fused.value).rms
+    assert rms["attitude"] < 0.6 * rms["accelerometer"]
+    assert rms["accelerometer"] < 3.0
+
+
+def test_the_fusion_is_calmer_than_the_compass_alone():
+    log = FIXTURES / "mission_compensated.tlog"
+    recording, truth = read(log), read_truth(log)
+    fit = analyse(recording, Options(compass=1)).compasses[0].fit
+    made = track(recording, 1, fit.correction, fit.regressor, tuning=Tuning())
+    alone = accuracy(truth, made.time, made.corrected)
+    fused = accuracy(truth, made.fused.time, made.fused.value)
+    assert fused.rms < 0.5 * alone.rms

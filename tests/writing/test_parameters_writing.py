@@ -1,0 +1,184 @@
+"""What stands on the vehicle after a write, whatever happens on the way."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from fake_autopilot import NEW, OLD, QUAD, WANTED, FakeAutopilot, FakeLink, Network, VirtualClock
+
+from magcomp.writing.events import Outcome, Standing
+from magcomp.writing.files import read_parameter_file
+from magcomp.writing.journal import read_journal
+from magcomp.writing.plan import plan
+from magcomp.writing.writer import read_current, write
+
+
+class Killed(BaseException):
+    """The program ends here, as by SIGKILL."""
+
+
+def upload(link: FakeLink, backup: Path, wanted=WANTED, **options) -> Outcome:
+    current = read_current(link, QUAD, wanted, clock=link.clock)
+    return write(plan(current, wanted, QUAD), link, backup=backup, clock=link.clock, **options)
+
+
+def restore(autopilot: FakeAutopilot, clock: VirtualClock, backup: Path) -> Outcome:
+    clock.now += 10.0
+    link = FakeLink(autopilot, clock)
+    return upload(link, backup.with_name("second.param"), read_parameter_file(backup))
+
+
+def assert_never_half_written(autopilot: FakeAutopilot) -> None:
+    for state in autopilot.states:
+        assert state["COMPASS_MOTCT"] == 0 or state in (OLD, NEW)
+
+
+def test_a_good_link_carries_three_compasses_in_less_than_two_seconds(tmp_path: Path) -> None:
+    autopilot, clock = FakeAutopilot(OLD), VirtualClock()
+    link = FakeLink(autopilot, clock)
+    current = read_current(link, QUAD, WANTED, clock=clock)
+    begin = clock.now
+    todo = plan(current, WANTED, QUAD)
+    outcome = write(todo, link, backup=tmp_path / "b.param", clock=clock)
+    assert outcome == Outcome(Standing.NEW)
+    assert autopilot.calibration() == NEW
+    assert len(todo.changes) == 37
+    assert clock.now - begin < 2.0
+    assert_never_half_written(autopilot)
+
+
+LOSSY = {"loss": 0.3, "latency": 0.2}
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_thirty_per_cent_loss_each_way_and_200_ms_latency_are_survived(
+    tmp_path: Path, seed: int
+) -> None:
+    autopilot, clock = FakeAutopilot(OLD), VirtualClock()
+    link = FakeLink(autopilot, clock, Network(**LOSSY, seed=seed))
+    assert upload(link, tmp_path / "b.param") == Outcome(Standing.NEW)
+    assert autopilot.calibration() == NEW
+    assert_never_half_written(autopilot)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_duplicates_and_reordering_never_mix_old_and_new(tmp_path: Path, seed: int) -> None:
+    autopilot, clock = FakeAutopilot(OLD), VirtualClock()
+    network = Network(0.2, 0.2, latency=0.02, jitter=0.5, seed=seed)
+    link = FakeLink(autopilot, clock, network)
+    assert upload(link, tmp_path / "b.param").good
+    link.drain()
+    assert autopilot.calibration() in (NEW, {**NEW, "COMPASS_MOTCT": 0.0})
+    assert_never_half_written(autopilot)
+
+
+def dies(link: FakeLink) -> None:
+    link.dead = True
+
+
+def is_pulled(link: FakeLink) -> None:
+    link.broken = True
+    link.dead = True
+
+
+def reboots(link: FakeLink) -> None:
+    link.autopilot.reboot(link.clock.now)
+
+
+def reboots_before_the_newest_writes_are_stored(link: FakeLink) -> None:
+    link.autopilot.reboot(link.clock.now, stored=False)
+
+
+def is_killed(link: FakeLink) -> None:
+    raise Killed
+
+
+def is_interrupted(link: FakeLink) -> None:
+    raise KeyboardInterrupt
+
+
+def arms(link: FakeLink) -> None:
+    link.autopilot.armed = True
+
+
+FAULTS = [
+    dies,
+    is_pulled,
+    reboots,
+    reboots_before_the_newest_writes_are_stored,
+    is_killed,
+    is_interrupted,
+    arms,
+]
+
+
+def messages_of_a_clean_write(folder: Path) -> int:
+    link = FakeLink(FakeAutopilot(OLD), VirtualClock())
+    current = read_current(link, QUAD, WANTED, clock=link.clock)
+    before = link.messages
+    write(plan(current, WANTED, QUAD), link, backup=folder / "clean.param", clock=link.clock)
+    return link.messages - before
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_fault_at_any_message_leaves_all_old_or_all_new_or_off_and_restorable(
+    tmp_path: Path, fault: Callable[[FakeLink], None]
+) -> None:
+    """The table of all cases: the fault comes just before message 0, 1, 2, ... of the write."""
+    count = messages_of_a_clean_write(tmp_path)
+    assert count > 2 * 3 * 37
+    stood = {"old": 0, "new": 0, "off": 0}
+    for at in range(count):
+        folder = tmp_path / str(at)
+        folder.mkdir()
+        stood[stands_after(fault, at, folder)] += 1
+    assert sum(stood.values()) == count
+
+
+def stands_after(fault: Callable[[FakeLink], None], at: int, folder: Path) -> str:
+    autopilot, clock = FakeAutopilot(OLD), VirtualClock()
+    link = FakeLink(autopilot, clock)
+    backup = folder / "b.param"
+    current = read_current(link, QUAD, WANTED, clock=clock)
+    begin = link.messages
+
+    def strike(number: int) -> None:
+        if number == begin + at:
+            fault(link)
+
+    link.before_message = strike
+    outcome = None
+    try:
+        outcome = write(plan(current, WANTED, QUAD), link, backup=backup, clock=clock)
+    except Killed:
+        link.drain()
+    autopilot.armed = False
+    assert_never_half_written(autopilot)
+    held = autopilot.calibration()
+    journal = read_journal(backup)
+    assert journal.outcome == outcome
+    check_claim(journal.standing, held)
+    if outcome is not None and outcome.good:
+        assert held == NEW
+        return "new"
+    states = len(autopilot.states)
+    assert restore(autopilot, clock, backup).good
+    assert autopilot.calibration() == OLD
+    for state in autopilot.states[states:]:
+        assert state["COMPASS_MOTCT"] == 0 or state in (OLD, NEW)
+    return "old" if held == OLD else "new" if held == NEW else "off"
+
+
+def check_claim(standing: Standing, held: dict[str, float]) -> None:
+    """What the journal or the outcome says is true."""
+    match standing:
+        case Standing.OLD:
+            assert held == OLD
+        case Standing.NEW:
+            assert held == NEW
+        case Standing.OFF:
+            assert held["COMPASS_MOTCT"] == 0
+        case Standing.UNSURE:
+            assert held in (OLD, NEW) or held["COMPASS_MOTCT"] == 0
