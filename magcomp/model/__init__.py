@@ -24,6 +24,7 @@ from magcomp.model.fit import (
 )
 from magcomp.model.parameters import ParameterSet
 from magcomp.model.recording import (
+    Applied,
     BoolArray,
     FloatArray,
     IntArray,
@@ -55,6 +56,7 @@ __all__ = [
     "THROTTLE",
     "UNITS",
     "Analysis",
+    "Applied",
     "BoolArray",
     "CompassResult",
     "Control",

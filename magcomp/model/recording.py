@@ -6,8 +6,9 @@ Units inside magcomp are mGauss, amperes, volts, radians, seconds and throttle
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -118,7 +119,7 @@ class ParameterHistory:
     """
 
     changes: tuple[ParameterChange, ...] = ()
-    _by_name: Mapping[str, tuple[ParameterChange, ...]] = field(
+    _by_name: Mapping[str, tuple[ParameterChange, ...]] = dataclasses.field(
         init=False, repr=False, compare=False, default_factory=dict
     )
 
@@ -153,6 +154,22 @@ class ParameterHistory:
 
 
 @dataclass(frozen=True, eq=False)
+class Applied:
+    """What a log itself says was applied to the readings of one compass.
+
+    Attributes
+    ----------
+    offset
+        Offsets that were added, mGauss, at the times of the compass's field; value (n, 3).
+    motor
+        Motor correction that was added last, mGauss, at the same times; value (n, 3).
+    """
+
+    offset: Series
+    motor: Series
+
+
+@dataclass(frozen=True, eq=False)
 class Recording:
     """Everything of a log, or of a live link so far, that the rest of magcomp needs.
 
@@ -182,6 +199,16 @@ class Recording:
         Latitude and longitude in degrees, altitude above sea level in m, shape (n, 3).
     armed
         1 armed, 0 disarmed, shape (n,).
+    format
+        What it was read from: ``"tlog"``, ``"live"``, ``"dataflash"`` or ``"ulog"``. How late a
+        quantity is depends on it.
+    other_currents
+        Battery instance (1, 2, …) to its current in A, where there is more than one battery.
+    applied
+        Compass number to what the log says was applied to its readings, where it says so
+        (dataflash does); empty where only parameters tell.
+    raw_compasses
+        Compasses whose ``field`` is the sensor's own, turned into body axes and not corrected.
     """
 
     source: str
@@ -200,3 +227,7 @@ class Recording:
     outputs: Series | None = None
     position: Series | None = None
     armed: Series | None = None
+    format: str = "tlog"
+    other_currents: Mapping[int, Series] = dataclasses.field(default_factory=dict)
+    applied: Mapping[int, Applied] = dataclasses.field(default_factory=dict)
+    raw_compasses: frozenset[int] = frozenset()
