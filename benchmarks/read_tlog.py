@@ -29,7 +29,7 @@ from pymavlink import mavutil
 from pymavlink.dialects.v20.ardupilotmega import PROTOCOL_MARKER_V2, mavlink_map
 from pymavlink.generator.mavcrc import x25crc
 
-from magcomp.sources.columns import Message
+from magcomp.mavlink.messages import Message
 from magcomp.sources.tlog import read_tlog
 
 MESSAGES = [message.name for message in Message]

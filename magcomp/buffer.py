@@ -13,18 +13,20 @@ code that reads a log, and gives the same numbers. Over its bound:
 from __future__ import annotations
 
 import math
-import struct
 import threading
 from collections import Counter
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from magcomp.mavlink.header import message_id, payload, source
+from magcomp.mavlink.messages import WANTED, Message, decode_frame
+from magcomp.mavlink.parameters import name_and_field
+from magcomp.mavlink.records import STAMP_SIZE, chain, record
 from magcomp.model import FloatArray, Recording
 from magcomp.sources.assemble import recording_from_bytes
-from magcomp.sources.columns import WANTED, Message
+from magcomp.sources.vehicles import Choice
 
 DEFAULT_LIMIT = 8 << 20
 """Bytes: a quarter of an hour of three compasses at 50 Hz whole, most of an hour thinned.
@@ -39,11 +41,7 @@ BANDS, SECTORS = 6, 12
 
 _BLOCK_US = 10_000_000
 _FASTEST_HZ = 20.0
-_STAMP = struct.Struct(">Q")
-_ATTITUDE = struct.Struct("<Ifff")
-_VFR_HUD = struct.Struct("<ffffhH")
 _PINNED = frozenset({Message.PARAM_VALUE, Message.AUTOPILOT_VERSION, Message.STATUSTEXT})
-_PARAMETER_NAME = slice(8, 24)
 _TYPICAL_DIP = math.radians(60.0)
 
 
@@ -69,11 +67,6 @@ class Coverage:
         """Share of the time at each level, shape (LEVELS,); zeros before the first attitude."""
         total = max(int(self.counts.sum()), 1)
         return np.asarray(self.counts.sum(axis=1) / total, dtype=np.float64)
-
-    @staticmethod
-    def level_edges() -> FloatArray:
-        """Throttle 0 … 1 where the levels begin and end, shape (LEVELS + 1,)."""
-        return np.linspace(0.0, 1.0, LEVELS + 1)
 
 
 @dataclass
@@ -109,7 +102,7 @@ class Buffer:
         self._size = 0
         self._blocks: list[_Block] = []
         self._kept = bytearray()
-        self._kept_values: dict[bytes, bytes] = {}
+        self._kept_values: dict[tuple[tuple[int, int, int], bytes], bytes] = {}
         self._lock = threading.Lock()
         self._field = (math.cos(dip_rad), math.sin(dip_rad))
         self._level = 0
@@ -123,15 +116,14 @@ class Buffer:
 
     def add(self, unix_us: int, frame: bytes) -> None:
         """Take one whole frame that arrived at ``unix_us``; what no fit needs is passed over."""
-        message = _message_id(frame)
+        message = message_id(frame)
         if message not in WANTED:
             return
         with self._lock:
             block = self._block(unix_us)
             block.end_us = unix_us
-            block.records += _STAMP.pack(unix_us)
-            block.records += frame
-            self._size += len(frame) + _STAMP.size
+            block.records += record(unix_us, frame)
+            self._size += STAMP_SIZE + len(frame)
             self._cover(message, frame)
             while self._size > self._limit and self._shrink():
                 pass
@@ -141,13 +133,14 @@ class Buffer:
         with self._lock:
             return b"".join([self._kept, *(block.records for block in self._blocks)])
 
-    def snapshot(self, system: int | None = None) -> Recording:
+    def snapshot(self, system: int | None = None, component: int | None = None) -> Recording:
         """Give the recording so far, read as a log of the same frames would be.
 
         Parameters
         ----------
-        system
-            The vehicle's MAVLink system; None where there is only one.
+        system, component
+            The vehicle's MAVLink system; None where there is only one. Its autopilot's component;
+            None for the usual one.
 
         Raises
         ------
@@ -156,7 +149,7 @@ class Buffer:
         ChooseVehicleError
             There are several vehicles and none was chosen.
         """
-        return recording_from_bytes(self.data(), self._source, system)
+        return recording_from_bytes(self.data(), self._source, Choice(system, component), live=True)
 
     def coverage(self) -> Coverage:
         """Give the attitudes seen so far; counted as they came, so thinning changes nothing."""
@@ -169,10 +162,10 @@ class Buffer:
 
     def _cover(self, message: int, frame: bytes) -> None:
         if message == Message.VFR_HUD:
-            throttle = _unpack(_VFR_HUD, frame)[5] * 0.01
+            throttle = int(decode_frame(frame, message)["throttle"]) * 0.01
             self._level = min(int(throttle * LEVELS), LEVELS - 1)
         elif message == Message.ATTITUDE:
-            _, roll, pitch, yaw = _unpack(_ATTITUDE, frame)
+            _, roll, pitch, yaw = decode_frame(frame, message).tolist()[:4]
             if math.isfinite(roll + pitch + yaw):
                 cell = sphere_cell(*self._field_direction(roll, pitch, yaw))
                 self._counts[self._level, cell] += 1
@@ -211,7 +204,7 @@ class Buffer:
 
     def _thin(self, block: _Block) -> None:
         seconds = max((block.end_us - block.begin_us) * 1e-6, 1.0)
-        counts = Counter(_stream(record) for record in _records(block.records))
+        counts = Counter(_stream(frame) for _, frame in chain(block.records))
         fast = {stream for stream, count in counts.items() if count > _FASTEST_HZ * seconds}
         fast = {stream for stream in fast if stream[2] not in _PINNED}
         if not fast:
@@ -219,31 +212,27 @@ class Buffer:
             return
         turn: Counter[tuple[int, int, int]] = Counter()
         kept = bytearray()
-        for record in _records(block.records):
-            stream = _stream(record)
+        for whole, frame in chain(block.records):
+            stream = _stream(frame)
             turn[stream] += 1
             if stream not in fast or turn[stream] % 2:
-                kept += record
+                kept += whole
         self._size -= len(block.records) - len(kept)
         block.records = kept
         block.thinned += 1
 
     def _drop(self, block: _Block) -> None:
         self._size -= len(block.records)
-        for record in _records(block.records):
-            frame = bytes(record[_STAMP.size :])
-            message = _message_id(frame)
-            if message not in _PINNED:
+        for whole, frame in chain(block.records):
+            stream = _stream(frame)
+            if stream[2] not in _PINNED:
                 continue
-            payload = _payload(frame)
-            source = bytes(_stream(record)[:2]) + message.to_bytes(3, "little")
-            if message == Message.PARAM_VALUE:
-                key, value = source + payload[_PARAMETER_NAME], payload[:4]
-            else:
-                key, value = source + payload, b""
-            if self._kept_values.get(key) != value:
-                self._kept_values[key] = value
-                self._kept += record
+            content, value = payload(frame), b""
+            if stream[2] == Message.PARAM_VALUE:
+                content, value = name_and_field(content)
+            if self._kept_values.get((stream, content)) != value:
+                self._kept_values[stream, content] = value
+                self._kept += whole
 
 
 def sphere_cell(x: float, y: float, z: float) -> int:
@@ -253,36 +242,6 @@ def sphere_cell(x: float, y: float, z: float) -> int:
     return max(band, 0) * SECTORS + sector
 
 
-def _records(data: bytearray) -> Iterator[bytes]:
-    position = 0
-    while position < len(data):
-        size = _STAMP.size + _frame_size(data, position + _STAMP.size)
-        yield bytes(data[position : position + size])
-        position += size
-
-
-def _frame_size(data: bytes | bytearray, start: int) -> int:
-    if data[start] == 0xFE:
-        return data[start + 1] + 8
-    return data[start + 1] + (25 if data[start + 2] & 1 else 12)
-
-
-def _message_id(frame: bytes) -> int:
-    return frame[5] if frame[0] == 0xFE else int.from_bytes(frame[7:10], "little")
-
-
-def _stream(record: bytes) -> tuple[int, int, int]:
-    """System, component and message of a record."""
-    frame = record[_STAMP.size :]
-    at = 3 if frame[0] == 0xFE else 5
-    return frame[at], frame[at + 1], _message_id(frame)
-
-
-def _payload(frame: bytes) -> bytes:
-    header = 6 if frame[0] == 0xFE else 10
-    return frame[header : header + frame[1]]
-
-
-def _unpack(layout: struct.Struct, frame: bytes) -> tuple[float, ...]:
-    """Read the first fields of a payload, whose trailing zeros MAVLink 2 leaves out."""
-    return layout.unpack(_payload(frame)[: layout.size].ljust(layout.size, b"\0"))
+def _stream(frame: bytes) -> tuple[int, int, int]:
+    """System, component and message of a frame."""
+    return (*source(frame), message_id(frame))

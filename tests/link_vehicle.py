@@ -89,7 +89,9 @@ class FakeVehicle:
     def _on_param_request_read(self, message: mavlink.MAVLink_message) -> Iterator[object]:
         if message.param_id in self.parameters:
             value = self.parameters[message.param_id]
-            yield mavlink.MAVLink_param_value_message(message.param_id.encode(), value, 9, 1, 0)
+            yield mavlink.MAVLink_param_value_message(
+                message.param_id.encode(), value, mavlink.MAV_PARAM_TYPE_INT32, 1, 0
+            )
 
     def _on_timesync(self, message: mavlink.MAVLink_message) -> Iterator[object]:
         if message.tc1 == 0:

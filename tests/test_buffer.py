@@ -18,14 +18,14 @@ from magcomp.buffer import BANDS, LEVELS, SECTORS, Buffer, sphere_cell
 from magcomp.errors import LogError
 from magcomp.link import Recorder, connect
 from magcomp.link.address import Replay
-from magcomp.link.replay import records
 from magcomp.link.state import LinkState
+from magcomp.mavlink.records import records
 from magcomp.model import Recording, Series
 from magcomp.sources import read_tlog
 
 FIXTURES = Path(__file__).parents[1] / "sitl_fixtures"
 FIXTURE = FIXTURES / "flight.tlog"
-SERIES = [f.name for f in fields(Recording) if "Series" in str(f.type) and f.name != "field"]
+SERIES = [f.name for f in fields(Recording) if str(f.type) == "Series | None"]
 EVERYTHING = 1 << 30
 
 
@@ -44,9 +44,13 @@ def assert_same_series(first: Series | None, second: Series | None):
 
 
 def assert_same(first: Recording, second: Recording):
-    assert first.field.keys() == second.field.keys()
-    for compass in first.field:
-        assert_same_series(first.field[compass], second.field[compass])
+    for one, other in (
+        (first.field, second.field),
+        (first.other_currents, second.other_currents),
+    ):
+        assert one.keys() == other.keys()
+        for number in one:
+            assert_same_series(one[number], other[number])
     for name in SERIES:
         assert_same_series(getattr(first, name), getattr(second, name))
     assert first.parameters == second.parameters

@@ -50,8 +50,9 @@ class Connection:
         Where the vehicle is.
     opener
         Opens the transport, first now and again after each loss.
-    system
-        The vehicle to speak to; None takes the only one there is.
+    system, component
+        The vehicle to speak to; None takes the only system there is, and the component that
+        autopilots have.
     key
         Signing key of 32 bytes; None where the link is not signed.
     sinks
@@ -69,6 +70,7 @@ class Connection:
         opener: Callable[[], Transport],
         *,
         system: int | None = None,
+        component: int | None = None,
         key: bytes | None = None,
         sinks: Sequence[FrameSink] = (),
     ) -> None:
@@ -78,7 +80,9 @@ class Connection:
         self._sinks = Sinks(sinks)
         self._transport = opener()
         clock = self._transport.clock
-        self._state = LinkState(system=system, key=key, unix_us=clock.unix_us())
+        self._state = LinkState(
+            system=system, component=component, key=key, unix_us=clock.unix_us()
+        )
         self._inbox: deque[Message] = deque(maxlen=_INBOX)
         self._events: deque[LinkEvent] = deque(maxlen=_EVENTS)
         self._changed = threading.Condition()
@@ -343,6 +347,7 @@ class Connection:
             seconds,
             self._state.statistics(self._now()),
             self._state.heartbeats,
+            self._state.companions,
             self._state.foreign,
             system=self._system,
             baud=self.address.baud if isinstance(self.address, SerialLine) else None,
@@ -358,6 +363,7 @@ def connect(
     *,
     baud: int | None = None,
     system: int | None = None,
+    component: int | None = None,
     key: bytes | None = None,
     sinks: Sequence[FrameSink] = (),
     clock: Clock | None = None,
@@ -370,8 +376,9 @@ def connect(
         A connection string as in ``magcomp.link.address``, or what it was parsed into.
     baud
         For a serial port whose address does not say.
-    system
-        The vehicle to speak to; None takes the only one there is.
+    system, component
+        The vehicle to speak to; None takes the only system there is, and the component that
+        autopilots have.
     key
         Signing key of 32 bytes, from ``read_signing_key``.
     sinks
@@ -391,5 +398,10 @@ def connect(
     where = parse_address(address, baud=baud) if isinstance(address, str) else address
     time = clock or SystemClock()
     return Connection(
-        where, lambda: open_transport(where, time), system=system, key=key, sinks=sinks
+        where,
+        lambda: open_transport(where, time),
+        system=system,
+        component=component,
+        key=key,
+        sinks=sinks,
     )

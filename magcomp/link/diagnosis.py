@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from magcomp.link.identity import Heartbeat
 from magcomp.link.quality import LinkStatistics
+from magcomp.mavlink.heartbeat import Identity
 
 _NAMES_SHOWN = 4
 
@@ -14,7 +14,8 @@ def why_no_vehicle(
     address: str,
     seconds: float,
     statistics: LinkStatistics,
-    heartbeats: Sequence[Heartbeat],
+    heartbeats: Sequence[Identity],
+    companions: Sequence[Identity],
     foreign: Mapping[str, int],
     *,
     system: int | None = None,
@@ -26,8 +27,9 @@ def why_no_vehicle(
     ----------
     address, seconds
         Where, and for how long, a heartbeat was waited for.
-    statistics, heartbeats, foreign
-        What arrived: counts, autopilots, and names of messages from anyone else.
+    statistics, heartbeats, companions, foreign
+        What arrived: counts, autopilots, those that say they are one from another component, and
+        names of messages from anyone else.
     system
         The vehicle that was asked for, if one was.
     baud
@@ -50,6 +52,12 @@ def why_no_vehicle(
             else f"the baud rate {baud} is probably wrong (radios use 57600, USB does not care)"
         )
         return start + f"{statistics.bytes_received} bytes arrived but no MAVLink frames; {hint}."
+    if companions:
+        numbers = sorted({companion.component for companion in companions})
+        return start + (
+            f"only component {', '.join(map(str, numbers))} says that it is an autopilot, which "
+            "may be a companion; where it is the autopilot, choose it with --component."
+        )
     names = sorted(foreign, key=lambda name: -foreign[name])[:_NAMES_SHOWN]
     return start + (
         f"{statistics.frames} frames arrived, but none from an ArduPilot or PX4 autopilot "

@@ -18,11 +18,15 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from magcomp.link.signing import (
-    SIGNATURE_LENGTH,
-    SignatureCheck,
+from magcomp.link.signing import SignatureCheck, signing_timestamp
+from magcomp.mavlink.header import (
+    frame_length,
+    is_marker,
     is_signed,
-    signing_timestamp,
+    is_version_1,
+    next_marker,
+    sequence,
+    source,
 )
 
 Message = Any
@@ -31,8 +35,6 @@ Message = Any
 GROUND_STATION_SYSTEM = 255
 GROUND_STATION_COMPONENT = 190  # MAV_COMP_ID_MISSIONPLANNER, as ground stations announce themselves
 
-_V1, _V2 = 0xFE, 0xFD
-_SIGNED_FLAG = 0x01
 _PATIENCE_S = 1.0
 
 
@@ -46,14 +48,12 @@ class Frame:
     @property
     def source(self) -> tuple[int, int]:
         """System and component that sent it."""
-        if self.raw[0] == _V1:
-            return self.raw[3], self.raw[4]
-        return self.raw[5], self.raw[6]
+        return source(self.raw)
 
     @property
     def sequence(self) -> int:
         """The sender's running number, modulo 256."""
-        return self.raw[2] if self.raw[0] == _V1 else self.raw[4]
+        return sequence(self.raw)
 
 
 @dataclass
@@ -139,9 +139,9 @@ class Framer:
         pending = self._pending
         frames: list[Frame] = []
         while True:
-            start = _next_marker(pending, position)
+            start = next_marker(pending, position)
             self.counts.skipped += start - position
-            length = _frame_length(pending, start)
+            length = frame_length(pending, start)
             if length is None or start + length > len(pending):
                 return frames, start
             frame = self._decode(start, length) if length else None
@@ -166,17 +166,17 @@ class Framer:
     def _plausible(self, start: int, length: int) -> bool:
         """Tell whether what cannot be checked stands where a frame should."""
         pending, end = self._pending, start + length
-        if pending[start] == _V1 or (end < len(pending) and pending[end] not in (_V1, _V2)):
+        if is_version_1(pending[start:end]) or (end < len(pending) and not is_marker(pending[end])):
             return False
-        inner = _next_marker(pending, start + 1)
+        inner = next_marker(pending, start + 1)
         while inner < end:
             if self._is_sound(inner):
                 return False
-            inner = _next_marker(pending, inner + 1)
+            inner = next_marker(pending, inner + 1)
         return True
 
     def _is_sound(self, start: int) -> bool:
-        length = _frame_length(self._pending, start)
+        length = frame_length(self._pending, start)
         if not length or start + length > len(self._pending):
             return False
         try:
@@ -192,21 +192,3 @@ class Framer:
         self.counts.frames += 1
         self.counts.signed += is_signed(frame.raw)
         return True
-
-
-def _next_marker(data: bytearray, position: int) -> int:
-    """Index of the next byte that can begin a frame, or the end."""
-    found = [index for index in (data.find(_V1, position), data.find(_V2, position)) if index >= 0]
-    return min(found, default=len(data))
-
-
-def _frame_length(data: bytearray, start: int) -> int | None:
-    """Length of the frame whose marker is at ``start``; None while unknown, 0 where it is none."""
-    if len(data) - start < 3:
-        return None
-    if data[start] == _V1:
-        return data[start + 1] + 8
-    flags = data[start + 2]
-    if flags & ~_SIGNED_FLAG:
-        return 0
-    return data[start + 1] + 12 + (SIGNATURE_LENGTH if flags else 0)

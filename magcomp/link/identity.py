@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import re
-import struct
-from dataclasses import dataclass
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from magcomp.link.framing import Message
+from magcomp.mavlink.header import payload
+from magcomp.mavlink.heartbeat import Identity, identify
+from magcomp.mavlink.parameters import decode_param_value, encoding
 from magcomp.model import Vehicle
-from magcomp.sources.vehicles import AUTOPILOTS, KINDS
 
 _DEVICE_ID_NAMES = {
     "ardupilot": ("COMPASS_DEV_ID", "COMPASS_DEV_ID2", "COMPASS_DEV_ID3"),
@@ -21,36 +21,10 @@ _RETRY_S = 0.4
 _TRIES = 8
 
 
-@dataclass(frozen=True)
-class Heartbeat:
-    """What an autopilot's HEARTBEAT says of it.
-
-    Attributes
-    ----------
-    system, component
-        MAVLink identity.
-    autopilot
-        ``"ardupilot"`` or ``"px4"``.
-    kind
-        As in Vehicle.
-    """
-
-    system: int
-    component: int
-    autopilot: str
-    kind: str
-
-
-def read_heartbeat(message: Message) -> Heartbeat | None:
+def read_heartbeat(message: Message) -> Identity | None:
     """Read an autopilot's heartbeat; None for ground stations, gimbals and the like."""
-    autopilot = AUTOPILOTS.get(message.autopilot)
-    if autopilot is None or message.type == mavlink.MAV_TYPE_GCS:
-        return None
-    return Heartbeat(
-        message.get_srcSystem(),
-        message.get_srcComponent(),
-        autopilot,
-        KINDS.get(message.type, "unknown"),
+    return identify(
+        message.get_srcSystem(), message.get_srcComponent(), message.type, message.autopilot
     )
 
 
@@ -61,12 +35,13 @@ class Identification:
     answer for parameters it does not have, so after eight tries the rest stays unknown.
     """
 
-    def __init__(self, heartbeat: Heartbeat) -> None:
+    def __init__(self, heartbeat: Identity) -> None:
         self._heartbeat = heartbeat
         self._firmware = ""
         self._board = ""
         self._version_known = False
-        self._device_ids: dict[str, int] = {}
+        self._capabilities = 0
+        self._device_ids: dict[str, bytes] = {}
         self._tries = 0
         self._next_try = 0.0
 
@@ -74,7 +49,9 @@ class Identification:
     def vehicle(self) -> Vehicle:
         """Everything known so far."""
         names = _DEVICE_ID_NAMES[self._heartbeat.autopilot]
-        ids = (self._device_ids.get(name, 0) for name in names)
+        how = encoding(self._heartbeat.autopilot, self._capabilities)
+        sent = (self._device_ids[name] for name in names if name in self._device_ids)
+        ids = (_whole(decode_param_value(each, how).value) for each in sent)
         return Vehicle(
             autopilot=self._heartbeat.autopilot,
             kind=self._heartbeat.kind,
@@ -83,6 +60,7 @@ class Identification:
             firmware=self._firmware,
             device_ids=tuple(number for number in ids if number),
             board=self._board,
+            capabilities=self._capabilities,
         )
 
     def complete(self, now: float) -> bool:
@@ -96,6 +74,7 @@ class Identification:
         kind = message.get_type()
         if kind == "AUTOPILOT_VERSION":
             self._version_known = True
+            self._capabilities = message.capabilities
             self._firmware = firmware_version(message.flight_sw_version) or self._firmware
             # ArduPilot: APJ board id in the upper half.
             self._board = f"board {message.board_version >> 16}" if message.board_version else ""
@@ -103,7 +82,8 @@ class Identification:
             banner = _BANNER.search(message.text)
             self._firmware = banner[1] if banner else ""
         elif kind == "PARAM_VALUE" and message.param_id in self._known_names():
-            self._device_ids[message.param_id] = _integer_value(message, self._heartbeat.autopilot)
+            # Decoded when somebody asks: how it travels may become known later.
+            self._device_ids[message.param_id] = payload(bytes(message.get_msgbuf()))
 
     def due(self, now: float) -> list[Message]:
         """Questions to send now."""
@@ -146,9 +126,6 @@ def firmware_version(packed: int) -> str:
     return f"{packed >> 24 & 255}.{packed >> 16 & 255}.{packed >> 8 & 255}"
 
 
-def _integer_value(message: Message, autopilot: str) -> int:
-    """Read an integer parameter: a float by ArduPilot, the same four bytes by PX4."""
-    if autopilot == "px4":
-        return int.from_bytes(struct.pack("<f", message.param_value), "little", signed=True)
-    value = message.param_value
+def _whole(value: float) -> int:
+    """A device id from a parameter's value; 0 where it cannot be one."""
     return round(value) if abs(value) < 2**32 else 0

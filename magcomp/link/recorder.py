@@ -7,14 +7,12 @@ from __future__ import annotations
 
 import errno
 import os
-import struct
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
 from magcomp.errors import OutputError
-
-_STAMP = struct.Struct(">Q")
+from magcomp.mavlink.records import record
 
 
 class Recorder:
@@ -67,10 +65,10 @@ class Recorder:
         OutputError
             The disk is full, gone or read-only.
         """
-        record = _STAMP.pack(unix_us) + frame
+        left = record(unix_us, frame)
         try:
-            while record:
-                record = record[self._file.write(record) :]
+            while left:
+                left = left[self._file.write(left) :]
         except OSError as error:
             raise OutputError(f"{self.path} cannot be written: {error.strerror}.") from error
         self.frames += 1

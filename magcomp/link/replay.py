@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import mmap
-import struct
 import threading
-from collections.abc import Iterator
 
 from magcomp.errors import LogError
 from magcomp.link.address import Replay
 from magcomp.link.clock import Clock
 from magcomp.link.transport import ReplayEndedError
+from magcomp.mavlink.records import records
 
-_STAMP = struct.Struct(">Q")
-_MARKERS = (0xFE, 0xFD)
 _LONGEST_PAUSE_S = 5.0
-_YEAR_2000_US = 946_684_800_000_000
-_YEAR_2100_US = 4_102_444_800_000_000
 
 
 class ReplayTransport:
@@ -85,30 +80,6 @@ class ReplayTransport:
     def close(self) -> None:
         """See Transport.close."""
         self._closed.set()
-
-
-def records(data: bytes | mmap.mmap) -> Iterator[tuple[int, bytes]]:
-    """Stamps in µs and whole frames of a .tlog's bytes; what is neither is passed over."""
-    position = 0
-    while position + 11 <= len(data):
-        (stamp,) = _STAMP.unpack_from(data, position)
-        length = _length(data, position + 8)
-        if length and _YEAR_2000_US < stamp < _YEAR_2100_US:
-            if position + 8 + length > len(data):
-                return
-            yield stamp, bytes(data[position + 8 : position + 8 + length])
-            position += 8 + length
-        else:
-            position += 1
-
-
-def _length(data: bytes | mmap.mmap, start: int) -> int:
-    marker, payload, flags = data[start], data[start + 1], data[start + 2]
-    if marker not in _MARKERS:
-        return 0
-    if marker == _MARKERS[0]:
-        return payload + 8
-    return payload + 12 + (13 if flags & 1 else 0)
 
 
 def _read(address: Replay) -> bytes | mmap.mmap:

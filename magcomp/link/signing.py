@@ -1,7 +1,6 @@
 """MAVLink 2 signing: the key file, and the check of what arrives.
 
-A signed frame ends in link id (1 byte), timestamp (6 bytes, units of 10 µs since
-2015) and the first 6 bytes of SHA-256 over key, frame, link id and timestamp.
+The digest is the beginning of SHA-256 over the key and what the signature covers.
 """
 
 from __future__ import annotations
@@ -11,10 +10,9 @@ import hmac
 from pathlib import Path
 
 from magcomp.errors import InputError
+from magcomp.mavlink.header import is_signed, signature, source
 
 KEY_LENGTH = 32
-SIGNATURE_LENGTH = 13
-_SIGNED_FLAG = 0x01
 _EPOCH_2015_US = 1_420_070_400_000_000
 _UNIT_US = 10
 _MINUTE = 60 * 1_000_000 // _UNIT_US
@@ -62,11 +60,6 @@ def signing_timestamp(unix_us: int) -> int:
     return max(0, unix_us - _EPOCH_2015_US) // _UNIT_US
 
 
-def is_signed(frame: bytes) -> bool:
-    """Tell whether a whole MAVLink frame carries a signature."""
-    return frame[0] == 0xFD and bool(frame[2] & _SIGNED_FLAG)
-
-
 class SignatureCheck:
     """Decides which frames carry the key's signature and are not replayed.
 
@@ -89,11 +82,12 @@ class SignatureCheck:
         if not is_signed(frame):
             return False
         # The signature comes first: a forger must not be able to move a stream's time.
-        digest = hashlib.sha256(self._key + frame[:-6]).digest()[:6]
-        if not hmac.compare_digest(digest, frame[-6:]):
+        signed = signature(frame)
+        digest = hashlib.sha256(self._key + signed.covered).digest()[: len(signed.digest)]
+        if not hmac.compare_digest(digest, signed.digest):
             return False
-        timestamp = int.from_bytes(frame[-12:-6], "little")
-        stream = (frame[-SIGNATURE_LENGTH], frame[5], frame[6])
+        timestamp = signed.time
+        stream = (signed.link, *source(frame))
         oldest = self._streams.get(stream, self.newest - _MINUTE - 1)
         if timestamp <= oldest:
             return False

@@ -9,7 +9,8 @@ Rules
    they were asked for. Never a PARAM_SET.
 2. The first autopilot heard is the vehicle, unless another was chosen. A second one within
    the settling time makes the link ambiguous, and only who chooses gets on.
-3. A frame is the vehicle's when system *and* component are its own.
+3. A frame is the vehicle's when system *and* component are its own. Only an autopilot's
+   component is a vehicle (see magcomp.mavlink.heartbeat), or the one that was chosen.
 4. Three seconds without a frame of the vehicle are a gap, dated from the last one.
 5. A vehicle whose clock runs back by more than two seconds, three messages in a row, rebooted.
 6. A vehicle that talks, but has sent none of its streams for four seconds, has forgotten them, as
@@ -26,9 +27,10 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from magcomp.link.events import GapEnded, GapStarted, LinkEvent, VehicleFound, VehicleRebooted
 from magcomp.link.framing import Frame, Framer, Message
-from magcomp.link.identity import Heartbeat, Identification, read_heartbeat
+from magcomp.link.identity import Identification, read_heartbeat
 from magcomp.link.quality import Gap, LinkStatistics, RateMeter, SequenceCounter
 from magcomp.link.streams import StreamControl, StreamReport
+from magcomp.mavlink.heartbeat import Identity, is_vehicle
 from magcomp.model import Vehicle
 
 HEARTBEAT_S = 1.0
@@ -57,18 +59,28 @@ class LinkState:
 
     Parameters
     ----------
-    system
-        The vehicle to speak to; None takes the only one there is.
+    system, component
+        The vehicle to speak to; None takes the only system there is, and the component that
+        autopilots have.
     key
         Signing key, 32 bytes; None where frames are not signed.
     unix_us
         Calendar time of the start, for signatures.
     """
 
-    def __init__(self, *, system: int | None = None, key: bytes | None = None, unix_us: int = 0):
+    def __init__(
+        self,
+        *,
+        system: int | None = None,
+        component: int | None = None,
+        key: bytes | None = None,
+        unix_us: int = 0,
+    ) -> None:
         self._framer = Framer(key, unix_us)
         self._wanted_system = system
-        self._heartbeats: dict[tuple[int, int], Heartbeat] = {}
+        self._wanted_component = component
+        self._heartbeats: dict[tuple[int, int], Identity] = {}
+        self._companions: dict[tuple[int, int], Identity] = {}
         self._foreign: dict[str, int] = {}
         self._vehicle: tuple[int, int] | None = None
         self._found_at = math.inf
@@ -98,9 +110,14 @@ class LinkState:
         return self._identification.vehicle
 
     @property
-    def heartbeats(self) -> tuple[Heartbeat, ...]:
+    def heartbeats(self) -> tuple[Identity, ...]:
         """Every autopilot heard, in order of system and component."""
         return tuple(self._heartbeats[source] for source in sorted(self._heartbeats))
+
+    @property
+    def companions(self) -> tuple[Identity, ...]:
+        """Who says that it is an autopilot, from another component than the one spoken to."""
+        return tuple(self._companions[source] for source in sorted(self._companions))
 
     @property
     def foreign(self) -> Mapping[str, int]:
@@ -263,6 +280,10 @@ class LinkState:
         if heartbeat is None:
             return
         source = (heartbeat.system, heartbeat.component)
+        if not is_vehicle(heartbeat, self._wanted_component):
+            if len(self._companions) < _FOREIGN_NAMES:
+                self._companions[source] = heartbeat
+            return
         if self.settled(now) and source != self._vehicle:
             return  # a vehicle that joins later is not ours and does not make the link ambiguous
         self._heartbeats[source] = heartbeat

@@ -12,9 +12,9 @@ from typing import Any
 from magcomp.compensate import Compensator, Fusion, Motion, Reading, from_parameters, fuse
 from magcomp.fit.flight import LAG_MEAN_S
 from magcomp.geometry import gravity_direction
-from magcomp.live.latest import decoded
+from magcomp.mavlink.header import message_id, source
+from magcomp.mavlink.messages import Message, decode_frame
 from magcomp.model import CURRENT, InForce, Vehicle
-from magcomp.sources.columns import Message
 
 _FIELD_MESSAGES = {1: Message.RAW_IMU, 2: Message.SCALED_IMU2, 3: Message.SCALED_IMU3}
 _USED = frozenset((Message.RAW_IMU, Message.ATTITUDE, Message.VFR_HUD, Message.BATTERY_STATUS))
@@ -68,7 +68,7 @@ class Sensors:
 
     def add(self, unix_us: int, frame: bytes) -> None:  # noqa: ARG002
         """Take one whole frame, in the link's thread."""
-        if _message(frame) in self._wanted:
+        if message_id(frame) in self._wanted:
             self._frames.put(frame)
 
     def events(
@@ -91,10 +91,10 @@ class Sensors:
                 frame = self._frames.get(timeout=_LOOK_S)
             except queue.Empty:
                 continue
-            if _source(frame) != (vehicle.system, vehicle.component):
+            if source(frame) != (vehicle.system, vehicle.component):
                 continue
-            message = _message(frame)
-            content = decoded(frame, message)
+            message = message_id(frame)
+            content = decode_frame(frame, message)
             if message == Message.ATTITUDE:
                 self._attitudes.append(
                     (_seconds(content), float(content["roll"]), float(content["pitch"]))
@@ -183,14 +183,6 @@ def corrections(
         1, 2 or 3.
     """
     return from_parameters({**present, **chosen}, compass), from_parameters(present, compass)
-
-
-def _message(frame: bytes) -> int:
-    return frame[5] if frame[0] == 0xFE else int.from_bytes(frame[7:10], "little")
-
-
-def _source(frame: bytes) -> tuple[int, int]:
-    return (frame[3], frame[4]) if frame[0] == 0xFE else (frame[5], frame[6])
 
 
 def _seconds(content: Any) -> float:

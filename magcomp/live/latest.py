@@ -8,13 +8,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
+from magcomp.mavlink.header import message_id, payload, source
+from magcomp.mavlink.heartbeat import is_armed
+from magcomp.mavlink.messages import WANTED, Message, decode_frame
+from magcomp.mavlink.parameters import decode_param_value, encoding, name_and_field
 from magcomp.model import Vehicle
-from magcomp.sources.columns import WANTED, Message, layout, text
 
 _SENSOR_COMPASS = 0x04  # MAV_SYS_STATUS_SENSOR_3D_MAG
-_ARMED = 0x80  # MAV_MODE_FLAG_SAFETY_ARMED
 _FIELD_MESSAGES = {1: Message.RAW_IMU, 2: Message.SCALED_IMU2, 3: Message.SCALED_IMU3}
 _STALE_US = 2_000_000
 
@@ -64,26 +64,22 @@ class Latest:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._frames: dict[tuple[int, int], dict[int, tuple[int, bytes]]] = {}
-        self._parameters: dict[tuple[int, int], dict[str, float]] = {}
+        self._parameters: dict[tuple[int, int], dict[bytes, bytes]] = {}
         self._first_us = 0
         self._last_us = 0
 
     def add(self, unix_us: int, frame: bytes) -> None:
         """Take one whole frame that arrived at ``unix_us``."""
-        if frame[0] == 0xFE:
-            source, message = (frame[3], frame[4]), frame[5]
-        else:
-            source, message = (frame[5], frame[6]), int.from_bytes(frame[7:10], "little")
+        sender, message = source(frame), message_id(frame)
         with self._lock:
             self._first_us = self._first_us or unix_us
             self._last_us = unix_us
             if message not in WANTED or not _is_of_interest(message, frame):
                 return
-            self._frames.setdefault(source, {})[message] = (unix_us, frame)
+            self._frames.setdefault(sender, {})[message] = (unix_us, frame)
             if message == Message.PARAM_VALUE:
-                row = decoded(frame, message)
-                name = text(np.array([row["param_id"]]))[0]
-                self._parameters.setdefault(source, {})[name] = float(row["param_value"])
+                sent = payload(frame)
+                self._parameters.setdefault(sender, {})[name_and_field(sent)[0]] = sent
 
     @property
     def span_s(self) -> float:
@@ -94,7 +90,10 @@ class Latest:
     def parameters(self, vehicle: Vehicle) -> Mapping[str, float]:
         """Every parameter value the vehicle has reported, by name."""
         with self._lock:
-            return dict(self._parameters.get((vehicle.system, vehicle.component), {}))
+            sent = list(self._parameters.get((vehicle.system, vehicle.component), {}).values())
+        how = encoding(vehicle.autopilot, vehicle.capabilities)
+        values = (decode_param_value(each, how) for each in sent)
+        return {value.name: value.value for value in values}
 
     def heartbeat_us(self, vehicle: Vehicle) -> int:
         """When its newest heartbeat arrived, microseconds since 1970; 0 before the first."""
@@ -108,7 +107,7 @@ class Latest:
             kept = dict(self._frames.get((vehicle.system, vehicle.component), {}))
         newest = max((stamp for stamp, _ in kept.values()), default=0)
         rows = {
-            message: decoded(frame, message)
+            message: decode_frame(frame, message)
             for message, (stamp, frame) in kept.items()
             if message in (Message.HEARTBEAT, Message.SYS_STATUS) or newest - stamp < _STALE_US
         }
@@ -122,7 +121,7 @@ class Latest:
         }
         return Now(
             stamp_us=newest,
-            armed=None if heartbeat is None else bool(heartbeat["base_mode"] & _ARMED),
+            armed=None if heartbeat is None else is_armed(int(heartbeat["base_mode"])),
             # A compass the autopilot does not have is reported as exactly (0, 0, 0).
             fields={number: field for number, field in fields.items() if any(field)},
             silent=tuple(
@@ -142,15 +141,7 @@ class Latest:
 
 def _is_of_interest(message: int, frame: bytes) -> bool:
     """Leave out second batteries: the compensation multiplies by the first."""
-    return message != Message.BATTERY_STATUS or int(decoded(frame, message)["id"]) == 0
-
-
-def decoded(frame: bytes, message: int) -> Any:
-    """One frame's fields, by the names of its message."""
-    fields = layout(message)
-    header = 6 if frame[0] == 0xFE else 10
-    payload = frame[header : header + frame[1]][: fields.itemsize].ljust(fields.itemsize, b"\0")
-    return np.frombuffer(payload, fields)[0]
+    return message != Message.BATTERY_STATUS or int(decode_frame(frame, message)["id"]) == 0
 
 
 def _vector(row: Any, names: tuple[str, str, str]) -> Vector:

@@ -9,10 +9,11 @@ from magcomp.buffer import Buffer
 from magcomp.errors import OutputError
 from magcomp.link import FrameSink, Recorder
 from magcomp.live.latest import Latest
+from magcomp.mavlink.header import message_id
+from magcomp.mavlink.messages import Message, decode_frame
+from magcomp.mavlink.records import STAMP_SIZE
 
-_STAMP_SIZE = 8
 _LONGEST_STEP_MS = 1500
-_ATTITUDE = 30
 
 
 class Tap:
@@ -105,14 +106,12 @@ class Tap:
         except OutputError as error:
             self.failure = str(error)
             return
-        self._size += len(frame) + _STAMP_SIZE
+        self._size += len(frame) + STAMP_SIZE
 
     def _count(self, frame: bytes) -> None:
-        header, message = (6, frame[5]) if frame[0] == 0xFE else (10, frame[7])
-        if message != _ATTITUDE or (frame[0] == 0xFD and frame[8:10] != b"\0\0"):
+        if message_id(frame) != Message.ATTITUDE:
             return
-        # ATTITUDE begins with time_boot_ms.
-        now_ms = int.from_bytes(frame[header : header + min(frame[1], 4)], "little")
+        now_ms = int(decode_frame(frame, Message.ATTITUDE)["time_boot_ms"])
         if 0 < now_ms - self._last_attitude_ms < _LONGEST_STEP_MS:
             self._attitude_ms += now_ms - self._last_attitude_ms
         self._last_attitude_ms = now_ms

@@ -7,9 +7,10 @@ Units inside magcomp are mGauss, amperes, volts, radians, seconds and throttle
 from __future__ import annotations
 
 import dataclasses
+from bisect import bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
+from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -57,6 +58,8 @@ class Vehicle:
         COMPASS_DEV_ID, COMPASS_DEV_ID2, COMPASS_DEV_ID3, in that order, as far as known and not 0.
     board
         Flight controller, as far as a live vehicle names it; empty where unknown.
+    capabilities
+        AUTOPILOT_VERSION.capabilities, which say how its parameters travel; 0 where unknown.
     """
 
     autopilot: str
@@ -66,6 +69,7 @@ class Vehicle:
     firmware: str = ""
     device_ids: tuple[int, ...] = ()
     board: str = ""
+    capabilities: int = 0
 
 
 @dataclass(frozen=True)
@@ -110,6 +114,9 @@ class ParameterChange(NamedTuple):
     value: float
 
 
+_time = attrgetter("time")
+
+
 @dataclass(frozen=True)
 class ParameterHistory:
     """Every parameter value the vehicle reported, in order of time.
@@ -125,10 +132,10 @@ class ParameterHistory:
 
     def __post_init__(self) -> None:
         by_name: dict[str, list[ParameterChange]] = {}
-        for change in sorted(self.changes, key=lambda c: c.time):
+        for change in sorted(self.changes, key=_time):
             by_name.setdefault(change.name, []).append(change)
         frozen = {name: tuple(changes) for name, changes in by_name.items()}
-        object.__setattr__(self, "_by_name", MappingProxyType(frozen))
+        object.__setattr__(self, "_by_name", frozen)
 
     @property
     def names(self) -> frozenset[str]:
@@ -141,11 +148,10 @@ class ParameterHistory:
 
     def at(self, name: str, time: float, default: float) -> float:
         """Value of ``name`` in force at ``time``, or ``default`` where never reported."""
-        value = default
-        for index, change in enumerate(self.of(name)):
-            if index == 0 or change.time <= time:
-                value = change.value
-        return value
+        changes = self.of(name)
+        if not changes:
+            return default
+        return changes[max(bisect_right(changes, time, key=_time) - 1, 0)].value
 
     def last(self, name: str, default: float) -> float:
         """Value of ``name`` at the end of the recording."""

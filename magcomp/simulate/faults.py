@@ -15,7 +15,7 @@ import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from magcomp.errors import UsageError
-from magcomp.simulate.framing import message_id
+from magcomp.mavlink.header import message_id
 from magcomp.simulate.vehicle import Frame, Vehicle
 
 WRITING = frozenset(

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from magcomp.errors import OutputError
+from magcomp.mavlink.records import record as record_of
 from magcomp.simulate.ground import DEFAULT_RATES, Asker
 from magcomp.simulate.programs import Compensation, scenario
 from magcomp.simulate.truth import Truth
@@ -85,7 +85,7 @@ def write_tlog(
         with path.open("wb") as stream:
             for frame in record(vehicle, rates=rates):
                 stamp = round((start_unix_s + frame.time) * 1e6)
-                stream.write(struct.pack(">Q", stamp) + frame.data)
+                stream.write(record_of(stamp, frame.data))
     except OSError as error:
         raise OutputError(
             f"{path} must be writable for the simulated recording; "

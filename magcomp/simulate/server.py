@@ -9,8 +9,8 @@ import time
 from collections.abc import Callable
 
 from magcomp.errors import UsageError
+from magcomp.mavlink.splitter import Splitter
 from magcomp.simulate.faults import Faults, FaultyLink, Machine
-from magcomp.simulate.framing import Splitter
 from magcomp.simulate.transports import Transport, open_transport
 from magcomp.simulate.vehicle import Vehicle
 

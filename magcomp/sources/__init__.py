@@ -3,57 +3,71 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
-from magcomp.errors import LogError
+from magcomp.errors import InputError, LogError
 from magcomp.model import Recording
+from magcomp.sources.archive import is_archive, unpacked
+from magcomp.sources.formats import FORMATS, HEAD, Progress, format_of, is_log, other_of
 from magcomp.sources.source import mapped
 from magcomp.sources.tlog import read_tlog
+from magcomp.sources.vehicles import Choice
 
-__all__ = ["read"]
-
-_HEAD = 16
-# First bytes and names of logs that are not telemetry logs.
-_BEGINNINGS = {b"ULog\x01\x12\x35": "a PX4 log (.ulg)", b"\xa3\x95": "a dataflash log (.BIN)"}
-_SUFFIXES = {
-    ".ulg": "a PX4 log (.ulg)",
-    ".bin": "a dataflash log (.BIN)",
-    ".log": "a dataflash log in text (.log)",
-    ".csv": "a table (.csv)",
-}
+__all__ = ["read", "read_tlog"]
 
 
 def read(
     path: str | Path,
     *,
     system: int | None = None,
+    component: int | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Recording:
-    """Read a log of any format that magcomp knows.
+    """Read a log of any format that magcomp knows, or an archive that holds one.
 
     Parameters
     ----------
     path
         The log. What it holds counts, not its name.
-    system
-        The vehicle's MAVLink system, or None where the log holds only one.
+    system, component
+        The vehicle's MAVLink system, or None where the log holds only one, and its autopilot's
+        component, or None for the usual one.
     progress
         Called with the read fraction, 0 to 1.
 
     Raises
     ------
     LogError
-        The file cannot be read, or its format is not known yet.
+        The file cannot be read, or is no log that magcomp reads.
     ChooseVehicleError
-        The log holds several vehicles and ``system`` is None, or ``system`` is not in it.
+        The log holds several vehicles and none is chosen, or the chosen one is not in it.
     """
-    with mapped(path) as data:
-        head = bytes(data[:_HEAD])
-    known = (name for beginning, name in _BEGINNINGS.items() if head.startswith(beginning))
-    other = next(known, _SUFFIXES.get(Path(path).suffix.lower()))
+    path, choice = Path(path), Choice(system, component)
+    if not is_archive(_head(path)):
+        return _read(path, choice, progress)
+    with unpacked(path, is_log, HEAD) as inner:
+        try:
+            recording = _read(inner, choice, progress)
+        except InputError as error:
+            # The user knows the archive, not where it was unpacked.
+            raise type(error)(str(error).replace(str(inner), f"in {path}")) from error
+    return replace(recording, source=str(path))
+
+
+def _read(path: Path, choice: Choice, progress: Progress | None) -> Recording:
+    head = _head(path)
+    other = other_of(head)
     if other is not None:
+        wanted = " or ".join(each.title for each in FORMATS)
         raise LogError(
-            f"Log {path} must be a telemetry log (.tlog); instead received {other}, "
-            "which cannot be read yet."
+            f"Log {path} must be {wanted}; instead received {other.title}: {other.advice}."
         )
-    return read_tlog(path, system=system, progress=progress)
+    # What nobody recognises may be a telemetry log whose beginning is damaged.
+    chosen = format_of(head) or FORMATS[-1]
+    return chosen.read(path, choice, progress)
+
+
+def _head(path: Path) -> bytes:
+    with mapped(path) as data:
+        return bytes(data[:HEAD])

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from magcomp.errors import LogError
+from magcomp.mavlink.checksum import ByteArray, OffsetArray
+from magcomp.mavlink.frames import Frames, Scan, scan
+from magcomp.mavlink.heartbeat import Identity
+from magcomp.mavlink.messages import WANTED, Message, Table, crc_extra, decode
 from magcomp.model import FloatArray, ParameterHistory, ReadReport, Recording, Series, Vehicle
 from magcomp.sources import quantities
-from magcomp.sources.checksum import ByteArray, OffsetArray
 from magcomp.sources.clock import (
     MICROSECOND_WRAP,
     MILLISECOND_WRAP,
@@ -21,11 +23,9 @@ from magcomp.sources.clock import (
     Stamps,
     time_axis,
 )
-from magcomp.sources.columns import WANTED, Message, Table, crc_extra, decode
-from magcomp.sources.frames import Frames, Scan, scan
 from magcomp.sources.quantities import Messages, Timed
 from magcomp.sources.repeats import repeated
-from magcomp.sources.vehicles import Identity, choose, is_armed
+from magcomp.sources.vehicles import ONLY_ONE, Choice, choose
 
 Buffer = bytes | bytearray | memoryview | ByteArray
 
@@ -80,8 +80,10 @@ class Decoded:
 def recording_from_bytes(
     data: Buffer,
     source: str,
-    system: int | None = None,
+    choice: Choice = ONLY_ONE,
     progress: Callable[[float], None] | None = None,
+    *,
+    live: bool = False,
 ) -> Recording:
     """Read a telemetry log that is already in memory.
 
@@ -91,10 +93,12 @@ def recording_from_bytes(
         Records of eight bytes of time and one MAVLink frame, as a .tlog holds them.
     source
         Name of the log or address of the link, for people.
-    system
-        The vehicle's MAVLink system, or None where there is only one.
+    choice
+        The vehicle asked for, where there are several.
     progress
         Called with the read fraction, 0 to 1.
+    live
+        Whether the bytes are what a link received so far, and no file.
 
     Returns
     -------
@@ -106,15 +110,16 @@ def recording_from_bytes(
     LogError
         There is no MAVLink frame, or no autopilot's heartbeat.
     ChooseVehicleError
-        There are several vehicles and ``system`` is None, or ``system`` is not there.
+        There are several vehicles and none is chosen, or the chosen one is not there.
     """
-    return _recording(decode_vehicle(data, source, system, WANTED, progress), source)
+    decoded = decode_vehicle(data, source, choice, WANTED, progress)
+    return _recording(decoded, source, "live" if live else "tlog")
 
 
 def decode_vehicle(
     data: Buffer,
     source: str,
-    system: int | None,
+    choice: Choice,
     wanted: frozenset[int],
     progress: Callable[[float], None] | None = None,
 ) -> Decoded:
@@ -127,7 +132,7 @@ def decode_vehicle(
     if not found.verified:
         raise LogError(f"Log {source} must hold MAVLink frames; instead received {_look(octets)}.")
     heartbeats = found.frames[found.frames.message == Message.HEARTBEAT]
-    who = choose(source, heartbeats, decode(octets, heartbeats, Message.HEARTBEAT), system)
+    who = choose(source, heartbeats, decode(octets, heartbeats, Message.HEARTBEAT), choice)
     mine = (found.frames.system == who.system) & (found.frames.component == who.component)
     frames = found.frames[mine]
     rows = _rows(frames)
@@ -155,7 +160,7 @@ def decode_vehicle(
     )
 
 
-def _recording(decoded: Decoded, source: str) -> Recording:
+def _recording(decoded: Decoded, source: str, kind: str) -> Recording:
     messages, who = decoded.messages, decoded.who
     changes = quantities.parameters(messages, who.autopilot, simulation=False)
     parameters = ParameterHistory(tuple(changes))
@@ -169,10 +174,11 @@ def _recording(decoded: Decoded, source: str) -> Recording:
             component=who.component,
             firmware=quantities.firmware(messages),
             device_ids=quantities.device_ids(parameters),
+            capabilities=quantities.capabilities(messages),
         ),
         start_unix_s=decoded.start_unix_s,
         duration_s=decoded.duration_s,
-        field=MappingProxyType(quantities.field(messages)),
+        field=quantities.field(messages),
         parameters=parameters,
         report=decoded.report,
         attitude=quantities.attitude(messages),
@@ -183,7 +189,9 @@ def _recording(decoded: Decoded, source: str) -> Recording:
         voltage=quantities.voltage(messages),
         outputs=quantities.outputs(messages),
         position=quantities.position(messages),
-        armed=Series(heartbeats.time, is_armed(heartbeats.table)),
+        armed=Series(heartbeats.time, quantities.armed(heartbeats.table)),
+        format=kind,
+        other_currents=quantities.other_currents(messages),
     )
 
 

@@ -20,9 +20,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from magcomp.mavlink.checksum import OffsetArray
+from magcomp.mavlink.frames import MaskArray
 from magcomp.model import FloatArray
-from magcomp.sources.checksum import OffsetArray
-from magcomp.sources.frames import MaskArray
 
 SECOND = 1_000_000
 MILLISECOND_WRAP = (1 << 32) * 1000

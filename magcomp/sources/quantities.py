@@ -9,8 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from magcomp.mavlink.heartbeat import is_armed
+from magcomp.mavlink.messages import Message, Table, text
+from magcomp.mavlink.parameters import decode_values, encoding
 from magcomp.model import FloatArray, ParameterChange, ParameterHistory, Series
-from magcomp.sources.columns import Message, Table, text
 
 STANDARD_GRAVITY = 9.80665
 OUTPUTS = 16
@@ -19,9 +21,6 @@ _ABSENT_CURRENT = -1
 _ABSENT_UINT16 = 0xFFFF
 _FULL_THROTTLE = 100
 _FIX_3D = 3
-
-# MAV_PARAM_TYPE of integers; PX4 sends their bytes in the place of the float.
-_INTEGER_TYPES = {1: "<u1", 2: "<i1", 3: "<u2", 4: "<i2", 5: "<u4", 6: "<i4"}
 
 _SIMULATION_PREFIX = "SIM_"
 
@@ -96,6 +95,34 @@ def current(messages: Messages) -> Series | None:
     )
 
 
+def other_currents(messages: Messages) -> dict[int, Series]:
+    """Amperes of each battery beside the first, by its number; empty where there is no first.
+
+    A battery that is alone under another number is the first one of a vehicle that is fed its
+    battery over MAVLink, as in a simulation, and SYS_STATUS tells its current.
+    """
+    if Message.BATTERY_STATUS not in messages:
+        return {}
+    time, table = messages[Message.BATTERY_STATUS]
+    numbers = table["id"]
+    if not (numbers == 0).any():
+        return {}
+    found = {}
+    for number in np.flatnonzero(np.bincount(numbers))[1:].tolist():
+        rows = np.flatnonzero(numbers == number)
+        amperes = table["current_battery"][rows]
+        series = _series(time[rows], amperes / 100.0, amperes != _ABSENT_CURRENT)
+        if series is not None:
+            found[number] = series
+    return found
+
+
+def armed(table: Table) -> FloatArray:
+    """1 armed, 0 disarmed for each heartbeat, shape (n,)."""
+    state = np.array([is_armed(mode) for mode in range(256)], dtype=np.float64)
+    return np.asarray(state[table["base_mode"]])
+
+
 def voltage(messages: Messages) -> Series | None:
     """Volts of the first battery from millivolts."""
     return _fuller(_cell_sum(messages), _system_status(messages, "voltage_battery"))
@@ -128,8 +155,6 @@ def position(messages: Messages) -> Series | None:
 def parameters(messages: Messages, autopilot: str, simulation: bool) -> list[ParameterChange]:
     """Every value reported, in order of time. Not finite ones stay: they are refused by name.
 
-    ArduPilot casts integers to float; PX4 puts their bytes in its place.
-
     Parameters
     ----------
     messages
@@ -142,13 +167,8 @@ def parameters(messages: Messages, autopilot: str, simulation: bool) -> list[Par
     if Message.PARAM_VALUE not in messages:
         return []
     time, table = messages[Message.PARAM_VALUE]
-    value = table["param_value"].astype(np.float64)
-    if autopilot == "px4":
-        raw = np.ascontiguousarray(table["param_value"]).view(np.uint8).reshape(-1, 4)
-        for kind, code in _INTEGER_TYPES.items():
-            rows = table["param_type"] == kind
-            width = np.dtype(code).itemsize
-            value[rows] = np.ascontiguousarray(raw[rows, :width]).view(code)[:, 0]
+    how = encoding(autopilot, capabilities(messages))
+    value = decode_values(table["param_value"], table["param_type"], how)
     rows = zip(time.tolist(), text(table["param_id"]), value.tolist(), strict=True)
     # tuple.__new__ spares a Python call for each of a log's thousand parameters.
     return [
@@ -156,6 +176,13 @@ def parameters(messages: Messages, autopilot: str, simulation: bool) -> list[Par
         for row in rows
         if row[1].startswith(_SIMULATION_PREFIX) is simulation
     ]
+
+
+def capabilities(messages: Messages) -> int:
+    """AUTOPILOT_VERSION.capabilities as last reported; 0 where it was not."""
+    if Message.AUTOPILOT_VERSION not in messages:
+        return 0
+    return int(messages[Message.AUTOPILOT_VERSION].table["capabilities"][-1])
 
 
 def firmware(messages: Messages) -> str:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from magcomp.sources.checksum import OffsetArray
+from magcomp.mavlink.checksum import OffsetArray
+from magcomp.mavlink.frames import Frames, MaskArray
 from magcomp.sources.clock import NO_STAMP
-from magcomp.sources.frames import Frames, MaskArray
 
 # Odd, so that no two keys are mixed alike; large, so that neighbouring ones end far apart.
 _MIX = np.int64(0x1E3779B97F4A7C15)

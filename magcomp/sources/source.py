@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from magcomp.errors import LogError
-from magcomp.sources.checksum import ByteArray
+from magcomp.mavlink.checksum import ByteArray
 
 
 @contextmanager

@@ -8,17 +8,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
 
 import numpy as np
 from pymavlink.dialects.v20.ardupilotmega import MAVLINK_MSG_ID_SIMSTATE
 
 from magcomp.errors import MissingDataError
+from magcomp.mavlink.messages import WANTED
 from magcomp.model import Series
 from magcomp.sources.assemble import decode_vehicle
-from magcomp.sources.columns import WANTED
 from magcomp.sources.quantities import columns, parameters
 from magcomp.sources.source import mapped
+from magcomp.sources.vehicles import Choice
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,9 @@ class Truth:
     parameters: Mapping[str, float]
 
 
-def read_truth(path: str | Path, *, system: int | None = None) -> Truth:
+def read_truth(
+    path: str | Path, *, system: int | None = None, component: int | None = None
+) -> Truth:
     """Read SIMSTATE and the SIM_* parameters of a simulated vehicle's telemetry log.
 
     SIMSTATE carries no time of its own and gets that of its place between stamped messages.
@@ -53,7 +55,9 @@ def read_truth(path: str | Path, *, system: int | None = None) -> Truth:
         The log holds no SIMSTATE: it is not a simulation's.
     """
     with mapped(path) as data:
-        decoded = decode_vehicle(data, str(path), system, WANTED | {MAVLINK_MSG_ID_SIMSTATE})
+        decoded = decode_vehicle(
+            data, str(path), Choice(system, component), WANTED | {MAVLINK_MSG_ID_SIMSTATE}
+        )
     if MAVLINK_MSG_ID_SIMSTATE not in decoded.messages:
         raise MissingDataError(
             f"Log {path} must be a simulation's to know the truth; instead received no SIMSTATE."
@@ -65,5 +69,5 @@ def read_truth(path: str | Path, *, system: int | None = None) -> Truth:
     return Truth(
         attitude=Series(time[sound], attitude[sound]),
         position=Series(time[sound], columns(table, "lat", "lng")[sound] * 1e-7),
-        parameters=MappingProxyType({change.name: change.value for change in changes}),
+        parameters={change.name: change.value for change in changes},
     )

@@ -1,55 +1,39 @@
-"""Which autopilot of a log is meant, and what its heartbeats say about it."""
+"""Which autopilot of a log is meant."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from magcomp.errors import ChooseVehicleError, LogError
-from magcomp.model import FloatArray
-from magcomp.sources.columns import Table
-from magcomp.sources.frames import Frames
-
-_ARDUPILOT = 3
-_PX4 = 12
-AUTOPILOTS = {_ARDUPILOT: "ardupilot", _PX4: "px4"}
-"""The autopilots magcomp knows, by HEARTBEAT.autopilot."""
-
-KINDS = (
-    dict.fromkeys((2, 3, 4, 13, 14, 15, 29, 35), "copter")
-    | dict.fromkeys((1, *range(19, 26)), "plane")
-    | {10: "rover", 11: "boat", 12: "sub"}
-    | dict.fromkeys((0, 7, 8, 9, 16, 17, 28, 43), "unknown")
-)
-"""MAV_TYPE of everything that moves by itself; ground stations, gimbals, radios are not here."""
-
-_ARMED = 128
-_FIRST_COMPONENT = 1
+from magcomp.mavlink.frames import Frames
+from magcomp.mavlink.heartbeat import Identity, identify, vehicles
+from magcomp.mavlink.messages import Table
 
 
 @dataclass(frozen=True)
-class Identity:
-    """An autopilot that sends heartbeats.
+class Choice:
+    """The vehicle asked for, where a source may hold several.
 
     Attributes
     ----------
-    system, component
-        Its MAVLink address.
-    autopilot
-        ``"ardupilot"`` or ``"px4"``.
-    kind
-        As in :class:`magcomp.model.Vehicle`.
+    system
+        Its MAVLink system; None takes the only one there is.
+    component
+        Its autopilot's MAVLink component; None takes the number that autopilots have.
     """
 
-    system: int
-    component: int
-    autopilot: str
-    kind: str
+    system: int | None = None
+    component: int | None = None
 
 
-def choose(source: str, heartbeats: Frames, table: Table, system: int | None) -> Identity:
+ONLY_ONE = Choice()
+"""The only vehicle there is."""
+
+
+def choose(source: str, heartbeats: Frames, table: Table, choice: Choice) -> Identity:
     """The one autopilot a recording is made of.
 
     Parameters
@@ -58,63 +42,74 @@ def choose(source: str, heartbeats: Frames, table: Table, system: int | None) ->
         Name of the log, for messages.
     heartbeats, table
         All heartbeats of the log and their columns, shape (n,) each.
-    system
-        The system wanted, or None to take the only one there is.
+    choice
+        The vehicle asked for.
 
     Raises
     ------
     LogError
-        No autopilot sent a heartbeat, or not the one wanted.
+        No autopilot sent a heartbeat.
     ChooseVehicleError
-        Several did and none was chosen.
+        Several did and none was chosen, or not the one that was.
     """
-    found = sorted(_autopilots(heartbeats, table), key=lambda i: (i.system, i.component))
-    systems = sorted({identity.system for identity in found})
-    if not found:
+    heard = _identities(heartbeats, table)
+    if not heard:
         raise LogError(
             f"Log {source} must hold heartbeats of an ArduPilot or PX4 autopilot; "
             f"instead received {_who(heartbeats)}."
         )
-    if system is None and len(systems) > 1:
-        choices = " or ".join(f"--system {number}" for number in systems)
+    found = vehicles(heard, None, choice.component)
+    if not found:
+        raise _no_such_component(source, heard, choice.component)
+    if choice.system is None and len(found) > 1:
+        choices = " or ".join(f"--system {identity.system}" for identity in found)
         described = ", ".join(f"{i.system} ({i.autopilot} {i.kind})" for i in found)
         raise ChooseVehicleError(
             f"Log {source} must be read for one vehicle; instead received the systems "
             f"{described}: choose with {choices}."
         )
-    wanted = systems[0] if system is None else system
-    if wanted not in systems:
+    wanted = found if choice.system is None else vehicles(found, choice.system, choice.component)
+    if not wanted:
         raise ChooseVehicleError(
             f"--system must be an autopilot of log {source}, which holds system "
-            f"{', '.join(map(str, systems))}; instead received {wanted}."
+            f"{', '.join(str(identity.system) for identity in found)}; "
+            f"instead received {choice.system}."
         )
-    return next(identity for identity in found if identity.system == wanted)
+    return wanted[0]
 
 
-def is_armed(table: Table) -> FloatArray:
-    """1 armed, 0 disarmed for each heartbeat, shape (n,)."""
-    armed: FloatArray = ((table["base_mode"] & _ARMED) != 0).astype(np.float64)
-    return armed
+def _identities(heartbeats: Frames, table: Table) -> tuple[Identity, ...]:
+    """Each (system, component) with the last autopilot it said it was."""
+    parts = (heartbeats.system, heartbeats.component, table["type"], table["autopilot"])
+    key = np.zeros(len(heartbeats), dtype=np.int64)
+    for part in parts:
+        key = (key << 8) | part.astype(np.int64)
+    # The first of the reversed rows is the last that was said.
+    different, first = np.unique(key[::-1], return_index=True)
+    last: dict[tuple[int, int], Identity] = {}
+    for said in different[np.argsort(-first)].tolist():
+        identity = identify(*int(said).to_bytes(4, "big"))
+        if identity is not None:
+            last[identity.system, identity.component] = identity
+    return tuple(last.values())
 
 
-def _autopilots(heartbeats: Frames, table: Table) -> Iterable[Identity]:
-    """Each (system, component) with the last thing it said it was; one component per system."""
-    last = {
-        (s, c): (kind, autopilot)
-        for s, c, kind, autopilot in zip(
-            heartbeats.system.tolist(),
-            heartbeats.component.tolist(),
-            table["type"].tolist(),
-            table["autopilot"].tolist(),
-            strict=True,
+def _no_such_component(
+    source: str, heard: Sequence[Identity], component: int | None
+) -> LogError | ChooseVehicleError:
+    numbers = sorted({identity.component for identity in heard})
+    named = ", ".join(map(str, numbers))
+    if component is None:
+        choices = " or ".join(f"--component {number}" for number in numbers)
+        return LogError(
+            f"Log {source} must hold heartbeats of an autopilot, component 1; instead received "
+            f"those of component {named}, which may be a companion: where it is the autopilot, "
+            f"choose it with {choices}."
         )
-        if autopilot in AUTOPILOTS and kind in KINDS
-    }
-    for system in {s for s, _ in last}:
-        components = sorted(c for s, c in last if s == system)
-        component = _FIRST_COMPONENT if _FIRST_COMPONENT in components else components[0]
-        kind, autopilot = last[system, component]
-        yield Identity(system, component, AUTOPILOTS[autopilot], KINDS[kind])
+    return ChooseVehicleError(
+        f"--component must be an autopilot of log {source}, which holds component {named}; "
+        f"instead received {component}."
+    )
 
 
 def _who(heartbeats: Frames) -> str:

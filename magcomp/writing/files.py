@@ -22,13 +22,13 @@ from typing import TypeVar
 import numpy as np
 
 from magcomp.errors import OutputError, ParameterFileError, UsageError
+from magcomp.mavlink.parameters import REAL32
 from magcomp.model import ParameterSet, Vehicle
 
 SUFFIXES = (".param", ".parm", ".params")
 
 _LARGEST_FILE = 16 * 1024 * 1024
 _AUTOPILOT_COMPONENT = 1
-_REAL32 = 9  # MAV_PARAM_TYPE
 _INTEGER_TYPES = (
     (re.compile(r"COMPASS_(MOTCT|PMOT_EN)"), 2),  # INT8
     (re.compile(r"COMPASS_(DEV_ID[23]?|PRIO[123]_ID)|CAL_MAG(\d_ID|_COMP_TYP)"), 6),  # INT32
@@ -183,7 +183,9 @@ def format_parameters(parameters: ParameterSet, suffix: str) -> str:
         _rounded(value, name, "to be written")
     head = [_comment(line) for comment in parameters.comments for line in _comment_lines(comment)]
     if parameters.vehicle is not None:
-        head.append(_comment(f"{_VEHICLE_MARK} {json.dumps(asdict(parameters.vehicle))}"))
+        named = asdict(parameters.vehicle)
+        del named["capabilities"]  # a live vehicle says them itself
+        head.append(_comment(f"{_VEHICLE_MARK} {json.dumps(named)}"))
     return "".join(f"{line}\n" for line in (*head, *writer(parameters)))
 
 
@@ -396,7 +398,7 @@ def _qgroundcontrol(parameters: ParameterSet) -> Iterator[str]:
     yield f"# {_QGC_TITLE} {system}"
     yield f"# {_QGC_COLUMNS}"
     for name, value in parameters.values.items():
-        kind = next((kind for names, kind in _INTEGER_TYPES if names.fullmatch(name)), _REAL32)
+        kind = next((kind for names, kind in _INTEGER_TYPES if names.fullmatch(name)), REAL32)
         yield f"{system}\t{component}\t{name}\t{format_value(value)}\t{kind}"
 
 

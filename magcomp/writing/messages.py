@@ -6,27 +6,27 @@ The machines of this package speak these small frozen messages; `decode` and
 
 from __future__ import annotations
 
-import math
 import re
-import struct
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from magcomp.mavlink.header import payload
+from magcomp.mavlink.heartbeat import is_armed
+from magcomp.mavlink.parameters import (
+    NAME_SIZE,
+    REAL32,
+    Encoding,
+    ParamValue,
+    as_float,
+    decode_param_value,
+    encode_value,
+    encoding,
+)
 from magcomp.model import Vehicle
 
-REAL32 = 9
-"""MAV_PARAM_TYPE_REAL32."""
-
-NO_INDEX = 65535
-"""Index of a PARAM_VALUE that is no part of the list (−1 as uint16)."""
-
-_ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED
-_NAME_LENGTH = 16
-# How PX4 packs an integer of each MAV_PARAM_TYPE into the four bytes of the float field.
-_INTEGER_LAYOUT = {1: "<Bxxx", 2: "<bxxx", 3: "<Hxx", 4: "<hxx", 5: "<I", 6: "<i"}
 _DENIED = re.compile(r"Param write denied \((\w{1,16})\)")
 _PARAM_ERRORS = {
     1: "the vehicle does not know it",
@@ -35,17 +35,6 @@ _PARAM_ERRORS = {
     4: "the vehicle has no such component",
     5: "it is read-only",
 }
-
-
-@dataclass(frozen=True)
-class ParamValue:
-    """What a parameter is on the vehicle: part of the list, an answer, or an echo of a write."""
-
-    name: str
-    value: float
-    type: int = REAL32
-    count: int = 0
-    index: int = NO_INDEX
 
 
 @dataclass(frozen=True)
@@ -117,18 +106,19 @@ class Peer:
     ----------
     system, component
         Its MAVLink identity; everything else on the link is ignored.
-    bytewise
-        Whether integers travel as bytes inside the float field (PX4) or as floats (ArduPilot).
+    encoding
+        How its parameters travel.
     """
 
     system: int
     component: int
-    bytewise: bool = False
+    encoding: Encoding = Encoding.CAST
 
     @classmethod
     def of(cls, vehicle: Vehicle) -> Peer:
         """Peer that a vehicle is."""
-        return cls(vehicle.system, vehicle.component, vehicle.autopilot == "px4")
+        how = encoding(vehicle.autopilot, vehicle.capabilities)
+        return cls(vehicle.system, vehicle.component, how)
 
 
 def decode(message: Any, peer: Peer) -> Incoming | None:
@@ -155,34 +145,16 @@ def encode(message: Outgoing, peer: Peer) -> mavlink.MAVLink_message:
         case ReadName(name):
             return mavlink.MAVLink_param_request_read_message(*to, _padded(name), -1)
         case SetValue(name, value, kind):
-            sent = _to_bytes(value, kind) if peer.bytewise else value
+            sent = as_float(encode_value(value, kind, peer.encoding))
             return mavlink.MAVLink_param_set_message(*to, _padded(name), sent, kind)
 
 
-def fits(value: float, kind: int) -> bool:
-    """Whether a parameter of a MAV_PARAM_TYPE can hold a value exactly."""
-    layout = _INTEGER_LAYOUT.get(kind)
-    if layout is None:
-        return math.isfinite(value)
-    try:
-        struct.pack(layout, int(value))
-    except (struct.error, ValueError, OverflowError):
-        return False
-    return int(value) == value
-
-
 def _param_value(message: Any, peer: Peer) -> Incoming:
-    value = float(message.param_value)
-    if peer.bytewise and message.param_type in _INTEGER_LAYOUT:
-        packed = struct.pack("<f", value)
-        value = float(struct.unpack(_INTEGER_LAYOUT[message.param_type], packed)[0])
-    return ParamValue(
-        _name(message), value, message.param_type, message.param_count, message.param_index
-    )
+    return decode_param_value(payload(bytes(message.get_msgbuf())), peer.encoding)
 
 
 def _heartbeat(message: Any, _: Peer) -> Incoming:
-    return Heartbeat(bool(message.base_mode & _ARMED))
+    return Heartbeat(is_armed(message.base_mode))
 
 
 def _status_text(message: Any, _: Peer) -> Incoming:
@@ -208,10 +180,4 @@ def _name(message: Any) -> str:
 
 
 def _padded(name: str) -> bytes:
-    return name.encode("ascii")[:_NAME_LENGTH]
-
-
-def _to_bytes(value: float, kind: int) -> float:
-    if kind not in _INTEGER_LAYOUT:
-        return value
-    return float(struct.unpack("<f", struct.pack(_INTEGER_LAYOUT[kind], int(value)))[0])
+    return name.encode("ascii")[:NAME_SIZE]

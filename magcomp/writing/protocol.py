@@ -52,6 +52,7 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
 
+from magcomp.mavlink.parameters import REAL32, ParamValue, fits
 from magcomp.writing.events import (
     Event,
     Intends,
@@ -68,14 +69,11 @@ from magcomp.writing.events import (
 from magcomp.writing.exchange import Exchange, Timing
 from magcomp.writing.files import format_value
 from magcomp.writing.messages import (
-    REAL32,
     Incoming,
     Outgoing,
     ParamRefused,
-    ParamValue,
     ReadName,
     SetValue,
-    fits,
 )
 from magcomp.writing.plan import WritePlan
 from magcomp.writing.watch import VehicleWatch

@@ -33,13 +33,12 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import Enum
 
+from magcomp.mavlink.parameters import NO_INDEX, ParamValue
 from magcomp.writing.exchange import Exchange, Timing
 from magcomp.writing.messages import (
-    NO_INDEX,
     Incoming,
     Outgoing,
     ParamRefused,
-    ParamValue,
     ReadAll,
     ReadIndex,
     ReadName,

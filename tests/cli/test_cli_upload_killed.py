@@ -17,9 +17,9 @@ from live_vehicle import COMPENSATION, alive, held, landed
 
 from magcomp.cli.app import run
 from magcomp.live.upload import read_backup
+from magcomp.mavlink.header import message_id
 from magcomp.model import ParameterSet
 from magcomp.simulate.faults import WRITING
-from magcomp.simulate.framing import message_id
 from magcomp.writing.events import Standing
 from magcomp.writing.files import write_parameter_file
 from magcomp.writing.journal import read_journal

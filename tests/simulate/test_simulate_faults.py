@@ -8,8 +8,8 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from magcomp.errors import UsageError
+from magcomp.mavlink.header import message_id
 from magcomp.simulate import Faults, FaultyLink, Vehicle, scenario
-from magcomp.simulate.framing import message_id
 from magcomp.simulate.ground import Asker
 
 RAW_IMU = mavlink.MAVLINK_MSG_ID_RAW_IMU

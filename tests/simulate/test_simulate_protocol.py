@@ -10,8 +10,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from magcomp.mavlink.header import message_id
+from magcomp.mavlink.splitter import Splitter
 from magcomp.simulate import Vehicle, scenario
-from magcomp.simulate.framing import Splitter, message_id
 from magcomp.simulate.ground import DEFAULT_RATES, Asker
 
 ACCEPTED, DENIED, UNSUPPORTED, FAILED = 0, 2, 3, 4

@@ -11,8 +11,8 @@ import pytest
 from pymavlink import mavutil
 from tlog_writer import REAL, RECORDINGS
 
-from magcomp.sources.columns import WANTED, Message, crc_extra, decode, layout, text
-from magcomp.sources.frames import scan
+from magcomp.mavlink.frames import scan
+from magcomp.mavlink.messages import WANTED, Message, crc_extra, decode, layout, text
 from magcomp.sources.source import mapped
 
 pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning")

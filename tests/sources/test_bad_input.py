@@ -81,7 +81,7 @@ def test_what_holds_no_autopilot_is_refused(tmp_path: Path, content: bytes, matc
 def test_other_formats_are_named(tmp_path: Path, name: str, content: bytes, match: str) -> None:
     path = tmp_path / name
     path.write_bytes(content)
-    refused(path, match + ", which cannot be read yet")
+    refused(path, match + ": give the")
 
 
 def test_a_telemetry_log_may_have_any_other_name(tmp_path: Path) -> None:

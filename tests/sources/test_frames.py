@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from pymavlink.generator.mavcrc import x25crc
 from tlog_writer import START_US, Sender, log, record, short_flight
 
-from magcomp.sources.checksum import checksums
-from magcomp.sources.columns import WANTED, Message, crc_extra, decode, layout
-from magcomp.sources.frames import WINDOW, Frames, Scan, scan
+from magcomp.mavlink.checksum import checksums
+from magcomp.mavlink.frames import WINDOW, Frames, Scan, scan
+from magcomp.mavlink.messages import WANTED, Message, crc_extra, decode, layout
 
 
 def search(data: bytes, window: int = WINDOW) -> Scan:

@@ -29,6 +29,7 @@ from magcomp.sources import read
 from magcomp.sources.assemble import recording_from_bytes
 from magcomp.sources.tlog import read_tlog
 from magcomp.sources.truth import read_truth
+from magcomp.sources.vehicles import Choice
 
 FLIGHT = ROOT / "sitl_fixtures" / "flight.tlog"
 
@@ -299,11 +300,11 @@ def test_two_vehicles_must_be_chosen_from() -> None:
     data = log(frames)
     with pytest.raises(ChooseVehicleError, match=r"--system 1 or --system 7"):
         recording_from_bytes(data, "test.tlog")
-    one = recording_from_bytes(data, "test.tlog", system=7)
+    one = recording_from_bytes(data, "test.tlog", Choice(7))
     assert one.vehicle.system == 7
     assert len(values(one.attitude)) == 40
     with pytest.raises(ChooseVehicleError, match="instead received 3"):
-        recording_from_bytes(data, "test.tlog", system=3)
+        recording_from_bytes(data, "test.tlog", Choice(3))
 
 
 # The report

@@ -278,7 +278,6 @@ class FakeLink:
 
 
 def sign(message: Any, system: int, component: int) -> Any:
-    """Say who sends a message, as its frame's header would."""
-    message._header.srcSystem = system
-    message._header.srcComponent = component
-    return message
+    """The message as it arrives from a sender."""
+    sender = mavlink.MAVLink(None, srcSystem=system, srcComponent=component)
+    return mavlink.MAVLink(None).decode(bytearray(message.pack(sender)))

@@ -32,6 +32,7 @@ from magcomp.errors import (
     VehicleRefusedError,
     WriteError,
 )
+from magcomp.mavlink.parameters import ParamValue
 from magcomp.writing.events import (
     Event,
     Intends,
@@ -49,7 +50,6 @@ from magcomp.writing.messages import (
     Heard,
     Heartbeat,
     ParamRefused,
-    ParamValue,
     SetValue,
 )
 from magcomp.writing.plan import WritePlan, plan

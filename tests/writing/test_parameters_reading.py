@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from magcomp.errors import LinkTimeoutError
+from magcomp.mavlink.parameters import Encoding, ParamValue
 from magcomp.writing.messages import (
     BootTime,
     Heard,
     Heartbeat,
     ParamRefused,
-    ParamValue,
     Peer,
     ReadAll,
     SetValue,
@@ -173,7 +173,7 @@ def test_arbitrary_messages_are_taken_and_nothing_is_written(
         assert reader.finished
 
 
-ARDUPILOT, PX4 = Peer(1, 1), Peer(1, 1, bytewise=True)
+ARDUPILOT, PX4 = Peer(1, 1), Peer(1, 1, encoding=Encoding.BYTEWISE)
 
 
 def over_the_wire(message: Any, system: int = 1, component: int = 1) -> Any:

@@ -1,4 +1,4 @@
-"""Decode the messages magcomp needs from frames into columns.
+"""The messages magcomp needs: their numbers, their layouts, and frames decoded into columns.
 
 The layouts come from pymavlink's message map, so this file holds no field offsets of its own.
 Only the map is used: pymavlink's own decoder works message by message.
@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pymavlink.dialects.v20.ardupilotmega import mavlink_map
 
-from magcomp.sources.checksum import ByteArray, OffsetArray
-from magcomp.sources.frames import Frames
+from magcomp.mavlink.checksum import ByteArray, OffsetArray
+from magcomp.mavlink.frames import Frames
+from magcomp.mavlink.header import payload
 
 # Structured: one named column per field of the message.
 Table = NDArray[Any]
@@ -24,7 +25,7 @@ _LARGEST_KNOWN_ID = 0xFFFF
 
 
 class Message(IntEnum):
-    """Ids of the messages that a Recording is made of."""
+    """Numbers of the messages that a Recording is made of."""
 
     HEARTBEAT = 0
     SYS_STATUS = 1
@@ -105,6 +106,17 @@ def _payloads(data: ByteArray, start: OffsetArray, length: ByteArray, width: int
             stretches = np.ndarray((len(data) - size + 1,), f"V{size}", data, strides=(1,))
             rows[which, :size] = stretches[start[which]].view(np.uint8).reshape(-1, size)
     return rows
+
+
+def decode_payload(sent: bytes, message: int) -> Table:
+    """Columns of one payload, as sent, shape (1,)."""
+    fields = layout(message)
+    return np.frombuffer(sent[: fields.itemsize].ljust(fields.itemsize, b"\0"), fields)
+
+
+def decode_frame(frame: bytes, message: int) -> Any:
+    """One whole frame's fields, by the names of its message."""
+    return decode_payload(payload(frame), message)[0]
 
 
 def text(column: NDArray[np.bytes_]) -> list[str]:

@@ -21,21 +21,23 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from magcomp.sources.checksum import ByteArray, OffsetArray, WordArray, checksums
+from magcomp.mavlink.checksum import ByteArray, OffsetArray, WordArray, checksums
+from magcomp.mavlink.header import (
+    CHECKSUM_SIZE,
+    HEADER_1,
+    HEADER_2,
+    MARKER_1,
+    MARKER_2,
+    SIGNATURE_SIZE,
+    SIGNED,
+)
+from magcomp.mavlink.records import STAMP_SIZE
 
 MaskArray = NDArray[np.bool_]
 
-STAMP_SIZE = 8
-MAGIC_V1 = 0xFE
-MAGIC_V2 = 0xFD
-_HEADER_V1 = 6
-_HEADER_V2 = 10
-_CHECKSUM_SIZE = 2
-_SIGNATURE_SIZE = 13
-_SIGNED = 0x01
-_SMALLEST_V1 = STAMP_SIZE + _HEADER_V1 + _CHECKSUM_SIZE
-_SMALLEST_V2 = STAMP_SIZE + _HEADER_V2 + _CHECKSUM_SIZE
-_LARGEST = _SMALLEST_V2 + 255 + _SIGNATURE_SIZE
+_SMALLEST_V1 = STAMP_SIZE + HEADER_1 + CHECKSUM_SIZE
+_SMALLEST_V2 = STAMP_SIZE + HEADER_2 + CHECKSUM_SIZE
+_LARGEST = _SMALLEST_V2 + 255 + SIGNATURE_SIZE
 
 # Every time before the year 2112 has a first byte of 0 and a second one below 16.
 _LATEST_SECOND_BYTE = 16
@@ -179,7 +181,7 @@ def scan(
 def _looks_like_record(data: ByteArray, low: int, high: int) -> NDArray[np.intp]:
     """Offsets in [low, high) with a plausible time followed by a frame's first byte."""
     region = data[low : high + STAMP_SIZE]
-    magic = (region[STAMP_SIZE:] - np.uint8(MAGIC_V2)) <= MAGIC_V1 - MAGIC_V2
+    magic = (region[STAMP_SIZE:] - np.uint8(MARKER_2)) <= MARKER_1 - MARKER_2
     magic &= region[:-STAMP_SIZE] == 0
     magic &= region[1 : 1 - STAMP_SIZE] < _LATEST_SECOND_BYTE
     return np.flatnonzero(magic) + low
@@ -189,13 +191,13 @@ def _candidates(data: ByteArray, low: int, high: int) -> _Candidates:
     """Every place in [low, high) where a whole record could begin."""
     size = len(data)
     start = _looks_like_record(data, low, max(low, min(high, size - _SMALLEST_V1 + 1)))
-    second = data[start + STAMP_SIZE] == MAGIC_V2
+    second = data[start + STAMP_SIZE] == MARKER_2
     length = data[start + 9]
     # A frame with flags that this reader does not know must not be decoded (MAVLink guide).
     flags = np.where(second, data[start + 10], 0)
-    payload = start + np.where(second, STAMP_SIZE + _HEADER_V2, STAMP_SIZE + _HEADER_V1)
-    end = payload + length + np.where(flags, _CHECKSUM_SIZE + _SIGNATURE_SIZE, _CHECKSUM_SIZE)
-    whole = (end <= size) & (flags <= _SIGNED)
+    payload = start + np.where(second, STAMP_SIZE + HEADER_2, STAMP_SIZE + HEADER_1)
+    end = payload + length + np.where(flags, CHECKSUM_SIZE + SIGNATURE_SIZE, CHECKSUM_SIZE)
+    whole = (end <= size) & (flags <= SIGNED)
     if not whole.all():
         start, second, length = start[whole], second[whole], length[whole]
         payload, end = payload[whole], end[whole]
@@ -262,7 +264,7 @@ def _followed(data: ByteArray, found: _Candidates) -> MaskArray:
     last = len(data) - STAMP_SIZE - 1
     at = np.minimum(found.end, max(last, 0))
     magic = data[np.minimum(at + STAMP_SIZE, len(data) - 1)]
-    record = (magic == MAGIC_V1) | (magic == MAGIC_V2)
+    record = (magic == MARKER_1) | (magic == MARKER_2)
     record &= (data[at] == 0) & (data[np.minimum(at + 1, len(data) - 1)] < _LATEST_SECOND_BYTE)
     followed: MaskArray = (record & (found.end <= last)) | (found.end == len(data))
     return followed
@@ -307,7 +309,7 @@ def _disjoint(start: OffsetArray, end: OffsetArray) -> NDArray[np.intp] | slice:
 
 def _sequence_at(found: _Candidates) -> OffsetArray:
     """Offset of the sequence number; the system and the component come after it."""
-    second = found.payload - found.start == STAMP_SIZE + _HEADER_V2
+    second = found.payload - found.start == STAMP_SIZE + HEADER_2
     return found.payload - np.where(second, 6, 4)
 
 

@@ -1,0 +1,194 @@
+"""The log formats magcomp reads, and what else is given in their place.
+
+A file is what its first bytes say, whatever its name.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from magcomp.mavlink import stream
+from magcomp.model import Recording
+from magcomp.sources import tlog
+from magcomp.sources.vehicles import Choice
+
+Progress = Callable[[float], None]
+
+HEAD = 1 << 13
+"""First bytes of a file that say what it is."""
+
+
+@dataclass(frozen=True)
+class Format:
+    """A kind of log that magcomp reads.
+
+    Attributes
+    ----------
+    name
+        As in ``Recording.format``.
+    title
+        For people, with its suffix.
+    recognises
+        Tells from the first ``HEAD`` bytes, or all there are, whether a file is of this kind.
+    read
+        Reads a file, where there are several vehicles the one chosen.
+    """
+
+    name: str
+    title: str
+    recognises: Callable[[bytes], bool]
+    read: Callable[[Path, Choice, Progress | None], Recording]
+
+
+@dataclass(frozen=True)
+class Other:
+    """A kind of file that is no log magcomp can read.
+
+    Attributes
+    ----------
+    title
+        What it is, for people.
+    advice
+        What to do instead.
+    recognises
+        Tells from the first bytes.
+    is_log
+        Whether it is a log all the same.
+    """
+
+    title: str
+    advice: str
+    recognises: Callable[[bytes], bool]
+    is_log: bool = False
+
+
+def of_one_vehicle(
+    read: Callable[[Path], Recording],
+) -> Callable[[Path, Choice, Progress | None], Recording]:
+    """Make a reader of logs that only ever hold one vehicle one of the table's."""
+
+    def read_any(path: Path, choice: Choice, progress: Progress | None) -> Recording:  # noqa: ARG001
+        return read(path)
+
+    return read_any
+
+
+def format_of(head: bytes) -> Format | None:
+    """The format of a file that begins with these bytes; None where it is none of ours."""
+    return next((each for each in FORMATS if each.recognises(head)), None)
+
+
+def other_of(head: bytes) -> Other | None:
+    """What a file is instead of a log that can be read; None where nobody knows it."""
+    return next((each for each in OTHERS if each.recognises(head)), None)
+
+
+def is_log(head: bytes) -> bool:
+    """Tell whether a file is a log, be it one that cannot be read yet."""
+    other = other_of(head)
+    return other.is_log if other is not None else format_of(head) is not None
+
+
+# ---------------------------------------------------------------- text
+
+_TEXT_SHARE = 0.95
+_PRINTABLE = frozenset(range(32, 127)) | {9, 10, 13}
+# Mission Planner's and MAVProxy's NAME,VALUE and NAME VALUE, QGroundControl's five columns.
+_PARAMETER = re.compile(rb"(?:\d+\t\d+\t)?[A-Z][A-Z0-9_]{1,15}[ \t]*[,=\s][ \t]*[-+.\dxA-Fa-f]")
+_TABLE = re.compile(rb"[^,;\t]*(?:[,;\t][^,;\t]*)+")
+_MOST = 0.8
+
+
+def is_text(head: bytes) -> bool:
+    """Tell whether bytes are nearly all printable ASCII, and some are there."""
+    printable = sum(octet in _PRINTABLE for octet in head)
+    return printable > _TEXT_SHARE * len(head)
+
+
+def _lines(head: bytes) -> list[bytes]:
+    """Whole lines that are no comments."""
+    lines = head.splitlines()
+    whole = lines[:-1] if len(head) == HEAD else lines
+    return [line.strip() for line in whole if line.strip() and not line.startswith((b"#", b"//"))]
+
+
+def _is_mostly(head: bytes, line: re.Pattern[bytes], matches: str) -> bool:
+    if not is_text(head):
+        return False
+    lines = _lines(head)
+    return sum(getattr(line, matches)(each) is not None for each in lines) > _MOST * len(lines)
+
+
+def _is_parameters(head: bytes) -> bool:
+    return _is_mostly(head, _PARAMETER, "match")
+
+
+def _is_table(head: bytes) -> bool:
+    return _is_mostly(head, _TABLE, "fullmatch")
+
+
+def _is_web_page(head: bytes) -> bool:
+    start = head.lstrip(b"\xef\xbb\xbf \t\r\n")[:64].lower()
+    return start.startswith((b"<!doctype html", b"<html", b"<head", b"<!--"))
+
+
+def _is_text_dataflash(head: bytes) -> bool:
+    # An older firmware puts a few lines of its own before the table of formats.
+    return re.search(rb"^FMT, ?128, ?89, ?FMT,", head, re.MULTILINE) is not None
+
+
+def _begins(*beginnings: bytes) -> Callable[[bytes], bool]:
+    return lambda head: head.startswith(beginnings)
+
+
+# ---------------------------------------------------------------- the tables
+
+FORMATS: tuple[Format, ...] = (
+    Format("tlog", "a telemetry log (.tlog)", tlog.recognises, tlog.read_chosen),
+)
+"""Every format that is read, in the order in which they are asked."""
+
+_NOT_YET = "give the .tlog of the same flight; this kind cannot be read yet"
+
+OTHERS: tuple[Other, ...] = (
+    Other("an empty file", "copy it again from where it came", lambda head: not head),
+    Other("a dataflash log (.BIN)", _NOT_YET, _begins(b"\xa3\x95"), is_log=True),
+    Other("a dataflash log in text (.log)", _NOT_YET, _is_text_dataflash, is_log=True),
+    Other("a PX4 log (.ulg)", _NOT_YET, _begins(b"ULog\x01\x12\x35"), is_log=True),
+    Other(
+        "raw MAVLink without times (.rlog)",
+        "give the .tlog that the ground station wrote beside it",
+        stream.is_unstamped,
+        is_log=True,
+    ),
+    Other(
+        "an archive that magcomp does not open (.7z, .rar, .xz, .bz2, .zst)",
+        "unpack it and give the log",
+        _begins(
+            b"7z\xbc\xaf\x27\x1c", b"Rar!\x1a\x07", b"\xfd7zXZ\x00", b"BZh", b"\x28\xb5\x2f\xfd"
+        ),
+    ),
+    Other(
+        "a Git-LFS pointer, which only stands for the log",
+        "fetch the log with git lfs pull",
+        _begins(b"version https://git-lfs.github.com/spec/"),
+    ),
+    Other(
+        "a web page, as a failed download leaves",
+        "download the log itself",
+        _is_web_page,
+    ),
+    Other(
+        "a parameter file (.param)",
+        "give the log of a flight; magcomp upload takes parameter files",
+        _is_parameters,
+    ),
+    Other("a text table (.csv)", "give the log that it was made from", _is_table),
+    Other(
+        "a text that is no log", "give the log as the vehicle or ground station wrote it", is_text
+    ),
+)
+"""What is often given in the place of a log, in the order in which they are asked."""
