@@ -152,6 +152,7 @@ def calibrate(
         record=record_to,
         force=wishes.force,
         system=link.system,
+        component=link.component,
         baud=link.baud,
         signing_key=link.key,
         options=options,

@@ -25,7 +25,7 @@ def check(log: Path, selection: Selection, to_json: bool) -> ExitCode:
     Ends with exit code 1 where the judge rejects any compass.
     """
     options = Options(selection.compass, start=selection.start, end=selection.end)
-    recording, verdicts = check_log(log, options, selection.system)
+    recording, verdicts = check_log(log, options, selection)
     kind = regressor_in_force(recording)
     if to_json:
         answer(as_json.dumps(as_json.check_object(recording, verdicts, kind)))

@@ -72,7 +72,7 @@ def fit(
         check_output(output, SUFFIXES, log, force=force)
     if report is not None:
         check_output(report, report_files.SUFFIXES, log, force=force)
-    recording, analysis = fit_log(log, options, selection.system)
+    recording, analysis = fit_log(log, options, selection)
     rejected = analysis.grade is Grade.REJECTED
     chosen = parameter_set(analysis, include_rejected=rejected and force)
     written = None

@@ -115,7 +115,8 @@ def heading(
             )
         chosen = {} if parameters is None else _chosen(parameters)
         wanted = Following(compass, chosen, positive_seconds(seconds) or math.inf, to_json)
-        return follow(source, replace(link, system=selection.system), wanted)
+        whom = replace(link, system=selection.system, component=selection.component)
+        return follow(source, whom, wanted)
     if seconds is not None:
         raise UsageError("--seconds must come with a live vehicle; instead received it with a log")
     log = Path(source)
@@ -145,7 +146,7 @@ def _correction(
     """The recording, what to correct it by, and where that comes from in words."""
     if parameters is None and not in_force:
         options = Options(compass, start=selection.start, end=selection.end)
-        recording, analysis = fit_log(log, options, selection.system)
+        recording, analysis = fit_log(log, options, selection)
         result = analysis.compasses[0]
         if result.verdict.grade is Grade.REJECTED:
             complain(f"the fit used here is rejected: {result.verdict.reasons[0]}")
@@ -155,7 +156,7 @@ def _correction(
             InForce(fit.correction, fit.regressor),
             (f"a fit of this log ({result.verdict.grade.value})"),
         )
-    recording = read(log, system=selection.system)
+    recording = read(log, system=selection.system, component=selection.component)
     values = present_parameters(recording)
     if parameters is None:
         return recording, from_parameters(values, compass), "the log's own parameters"
@@ -174,7 +175,7 @@ def _chosen(parameters: Path) -> Mapping[str, float]:
 
 def _truth(log: Path, selection: Selection) -> Truth | None:
     try:
-        return read_truth(log, system=selection.system)
+        return read_truth(log, system=selection.system, component=selection.component)
     except MissingDataError:
         return None
 

@@ -70,6 +70,7 @@ def follow(address: str, link: LinkOptions, wanted: Following) -> ExitCode:
         LiveSession.open(
             address,
             system=link.system,
+            component=link.component,
             baud=link.baud,
             signing_key=link.key,
             refit_share=0.0,

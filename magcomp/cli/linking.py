@@ -16,6 +16,7 @@ from typing import TypeVar
 import click
 
 from magcomp.cli.output import complain
+from magcomp.cli.vehicle import vehicle_options
 from magcomp.errors import UsageError
 from magcomp.link import read_signing_key
 
@@ -39,8 +40,9 @@ class LinkOptions:
 
     Attributes
     ----------
-    system
-        Its MAVLink system; None takes the only one there is.
+    system, component
+        Its MAVLink system; None takes the only one there is. Its autopilot's component; None for
+        the usual one.
     baud
         Of a serial port whose address does not say.
     key
@@ -50,19 +52,22 @@ class LinkOptions:
     """
 
     system: int | None
+    component: int | None
     baud: int | None
     key: bytes | None
     timeout: float
 
 
 def link_options(command: Callable[..., _Result]) -> Callable[..., _Result]:
-    """Give a command --system, --baud, --signing-key and --timeout as one ``LinkOptions``."""
+    """Give a command the options that say which vehicle, and how to reach it."""
 
-    @click.option("--system", type=click.IntRange(1, 255), help="MAVLink system of the vehicle.")
+    @vehicle_options
     @reach_options
     @functools.wraps(command)
-    def with_link(system: int | None, link: LinkOptions, **others: object) -> _Result:
-        return command(link=replace(link, system=system), **others)
+    def with_link(
+        system: int | None, component: int | None, link: LinkOptions, **others: object
+    ) -> _Result:
+        return command(link=replace(link, system=system, component=component), **others)
 
     return with_link
 
@@ -90,7 +95,7 @@ def reach_options(command: Callable[..., _Result]) -> Callable[..., _Result]:
         baud: int | None, signing_key: Path | None, timeout: float, **others: object
     ) -> _Result:
         key = None if signing_key is None else read_signing_key(signing_key)
-        return command(link=LinkOptions(None, baud, key, timeout), **others)
+        return command(link=LinkOptions(None, None, baud, key, timeout), **others)
 
     return with_reach
 

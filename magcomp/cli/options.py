@@ -13,6 +13,7 @@ from typing import TypeVar
 import click
 
 from magcomp.analysis.analyse import REGRESSORS
+from magcomp.cli.vehicle import vehicle_options
 from magcomp.errors import OutputError, UsageError
 from magcomp.fit import METHODS
 
@@ -50,16 +51,19 @@ class Selection:
         Seconds since the recording began.
     system
         MAVLink system of the vehicle; None where the log holds only one.
+    component
+        MAVLink component of its autopilot; None for the usual one.
     """
 
     compass: int | None
     start: float
     end: float
     system: int | None
+    component: int | None = None
 
 
 def selection_options(command: Callable[..., _Result]) -> Callable[..., _Result]:
-    """Give a command --compass, --start, --end and --system as one `Selection`."""
+    """Give a command --compass, --start, --end, --system and --component as one `Selection`."""
 
     @click.option("--compass", type=click.IntRange(1, 3), help="One compass; all by default.")
     @click.option(
@@ -68,12 +72,17 @@ def selection_options(command: Callable[..., _Result]) -> Callable[..., _Result]
     @click.option(
         "--end", type=float, default=math.inf, metavar="S", help="Leave out what is after, s."
     )
-    @click.option("--system", type=click.IntRange(1, 255), help="MAVLink system of the vehicle.")
+    @vehicle_options
     @functools.wraps(command)
     def with_selection(
-        compass: int | None, start: float, end: float, system: int | None, **others: object
+        compass: int | None,
+        start: float,
+        end: float,
+        system: int | None,
+        component: int | None,
+        **others: object,
     ) -> _Result:
-        return command(selection=Selection(compass, start, end, system), **others)
+        return command(selection=Selection(compass, start, end, system, component), **others)
 
     return with_selection
 

@@ -56,6 +56,7 @@ def record(
             record=output,
             force=force,
             system=link.system,
+            component=link.component,
             baud=link.baud,
             signing_key=link.key,
             refit_share=0.0,

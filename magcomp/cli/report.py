@@ -44,7 +44,7 @@ def report(
     """
     check_output(output, SUFFIXES, log, force=force)
     options = Options(selection.compass, method, regressor, selection.start, selection.end)
-    recording, analysis = fit_log(log, options, selection.system)
+    recording, analysis = fit_log(log, options, selection)
     write_text(
         output, report_text(output.suffix, recording, analysis, options=options), force=force
     )

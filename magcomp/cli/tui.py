@@ -7,12 +7,13 @@ from pathlib import Path
 
 import click
 
+from magcomp.cli.vehicle import vehicle_options
 from magcomp.errors import UsageError
 
 
 @click.command("tui")
 @click.argument("target", required=False, default="", metavar="[ADDRESS|LOG]")
-@click.option("--system", type=click.IntRange(1, 255), help="MAVLink system of the vehicle.")
+@vehicle_options
 @click.option("--theme", default="", help='For this time: "night", "sun", or any other there is.')
 @click.option(
     "--settings",
@@ -21,7 +22,9 @@ from magcomp.errors import UsageError
     metavar="FOLDER",
     help="Where settings.toml and what is remembered are kept.",
 )
-def tui(target: str, system: int | None, theme: str, folder: Path | None) -> int:
+def tui(
+    target: str, system: int | None, component: int | None, theme: str, folder: Path | None
+) -> int:
     """Work with a vehicle or a log in the terminal: connect, record, fit, write, verify.
 
     F1 helps everywhere. Nothing is written to a vehicle without a question.
@@ -34,4 +37,4 @@ def tui(target: str, system: int | None, theme: str, folder: Path | None) -> int
     # Textual is worth its import only here.
     from magcomp.tui import run  # noqa: PLC0415
 
-    return run(target, folder=folder, system=system, theme=theme)
+    return run(target, folder=folder, system=system, component=component, theme=theme)

@@ -122,7 +122,12 @@ class VehicleLink:
         """
         latest, status = Latest(), StatusLine()
         connection = connect(
-            address, baud=link.baud, system=link.system, key=link.key, sinks=[latest]
+            address,
+            baud=link.baud,
+            system=link.system,
+            component=link.component,
+            key=link.key,
+            sinks=[latest],
         )
         with connection:
             if isinstance(connection.address, Replay):

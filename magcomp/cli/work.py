@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from magcomp.analysis import Options, analyse, check
+from magcomp.cli.options import Selection
 from magcomp.cli.output import progress
 from magcomp.model import Analysis, Recording, Verdict
 from magcomp.sources import read
@@ -14,12 +15,10 @@ _READING = 0.1
 """Share of the progress bar that reading the log takes."""
 
 
-def fit_log(log: Path, options: Options, system: int | None) -> tuple[Recording, Analysis]:
+def fit_log(log: Path, options: Options, selection: Selection) -> tuple[Recording, Analysis]:
     """Read a log, fit and judge it."""
     with progress() as step:
-        recording = read(
-            log, system=system, progress=lambda share: step("reading the log", share * _READING)
-        )
+        recording = _read(log, selection, lambda share: step("reading the log", share * _READING))
         analysis = analyse(
             recording,
             options,
@@ -29,13 +28,17 @@ def fit_log(log: Path, options: Options, system: int | None) -> tuple[Recording,
 
 
 def check_log(
-    log: Path, options: Options, system: int | None
+    log: Path, options: Options, selection: Selection
 ) -> tuple[Recording, Mapping[int, Verdict]]:
     """Read a log and judge the calibration in force."""
     with progress() as step:
-        recording = read(log, system=system, progress=lambda share: step("reading the log", share))
+        recording = _read(log, selection, lambda share: step("reading the log", share))
         step("judging", 1.0)
         return recording, check(recording, options)
+
+
+def _read(log: Path, selection: Selection, progress: Callable[[float], None]) -> Recording:
+    return read(log, system=selection.system, component=selection.component, progress=progress)
 
 
 def present_parameters(recording: Recording) -> dict[str, float]:

@@ -115,13 +115,14 @@ class LiveSession:
             thread.start()
 
     @classmethod
-    def open(
+    def open(  # noqa: PLR0913 - what a command line offers
         cls,
         address: str,
         *,
         record: Path | None = None,
         force: bool = False,
         system: int | None = None,
+        component: int | None = None,
         baud: int | None = None,
         signing_key: bytes | None = None,
         clock: Clock | None = None,
@@ -139,7 +140,7 @@ class LiveSession:
             Write all that arrives into this .tlog.
         force
             Overwrite it.
-        system, baud, signing_key
+        system, component, baud, signing_key
             See ``magcomp.link.connect``; the key is 32 bytes from ``read_signing_key``.
         clock, rates, options, refit_share
             See the class.
@@ -158,7 +159,13 @@ class LiveSession:
         tap = Tap(Buffer(source), Latest(), recorder)
         try:
             connection = connect(
-                address, baud=baud, system=system, key=signing_key, sinks=[tap], clock=clock
+                address,
+                baud=baud,
+                system=system,
+                component=component,
+                key=signing_key,
+                sinks=[tap],
+                clock=clock,
             )
         except MagcompError:
             tap.close()
@@ -291,7 +298,9 @@ class LiveSession:
             No vehicle has been heard yet.
         """
         vehicle = self.connection.vehicle
-        return self._tap.buffer.snapshot(None if vehicle is None else vehicle.system)
+        if vehicle is None:
+            return self._tap.buffer.snapshot()
+        return self._tap.buffer.snapshot(vehicle.system, vehicle.component)
 
     def analyse(
         self, options: Options | None = None, progress: Progress = lambda _what, _share: None

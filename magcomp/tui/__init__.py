@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 from magcomp.tui.app import MagcompApp
-from magcomp.tui.services import Services
+from magcomp.tui.services import Services, open_live, read_log
 from magcomp.tui.settings import read_settings, settings_folder
 
 
 def run(
-    target: str = "", *, folder: Path | None = None, system: int | None = None, theme: str = ""
+    target: str = "",
+    *,
+    folder: Path | None = None,
+    system: int | None = None,
+    component: int | None = None,
+    theme: str = "",
 ) -> int:
     """Run the app in this terminal until the pilot leaves it.
 
@@ -20,8 +26,8 @@ def run(
         An address or a log to begin with; empty for none.
     folder
         Where settings and state are; the platform's place by default.
-    system
-        MAVLink system to work with.
+    system, component
+        MAVLink system to work with, and its autopilot's component where it is not 1.
     theme
         Theme for this time; that of the settings where empty.
 
@@ -37,7 +43,11 @@ def run(
     """
     place = settings_folder() if folder is None else folder
     settings = read_settings(place)
-    services = Services(folder=settings.folder)
+    services = Services(
+        folder=settings.folder,
+        read=partial(read_log, component=component),
+        open_live=partial(open_live, component=component),
+    )
     app = MagcompApp(target, settings=settings, folder=place, services=services, system=system)
     if theme:
         app.theme = theme

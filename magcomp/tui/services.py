@@ -93,9 +93,11 @@ class Simulation:
     stop: Callable[[], None]
 
 
-def open_live(address: str, record: Path, system: int | None) -> Session:
+def open_live(
+    address: str, record: Path, system: int | None, component: int | None = None
+) -> Session:
     """Open a vehicle's address and record what comes; see `LiveSession.open`."""
-    return LiveSession.open(address, record=record, system=system)
+    return LiveSession.open(address, record=record, system=system, component=component)
 
 
 def simulate() -> Simulation:
@@ -136,8 +138,9 @@ def _now() -> datetime:
     return datetime.now().astimezone()
 
 
-def _read(path: Path, system: int | None) -> Recording:
-    return read(path, system=system)
+def read_log(path: Path, system: int | None, component: int | None = None) -> Recording:
+    """Read a log; see :func:`magcomp.sources.read`."""
+    return read(path, system=system, component=component)
 
 
 @dataclass(frozen=True)
@@ -161,7 +164,7 @@ class Services:
     """
 
     ports: Callable[[], Sequence[SerialPort]] = serial_ports
-    read: Callable[[Path, int | None], Recording] = _read
+    read: Callable[[Path, int | None], Recording] = read_log
     open_live: Callable[[str, Path, int | None], Session] = open_live
     simulate: Callable[[], Simulation] = simulate
     now: Callable[[], datetime] = _now
