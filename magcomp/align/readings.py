@@ -10,6 +10,7 @@ from magcomp.model import (
     BoolArray,
     FloatArray,
     InForce,
+    IntArray,
     Readings,
     Recording,
     Series,
@@ -69,12 +70,12 @@ def readings(
             f"asked for; instead all {len(reported)} were repeats, gaps or outside it"
         )
     time = reported.time[keep]
-    in_force, stretch_starts = _corrections(recording, compass)
+    in_force, stretch = _corrections(recording, compass, time)
     return Readings(
         compass=compass,
         time=time,
         reported=_mend_truncation(reported.value[keep]),
-        stretch=np.searchsorted(stretch_starts, time, side="right").astype(np.intp),
+        stretch=stretch,
         in_force=in_force,
         attitude=Series(recording.attitude.time, np.unwrap(recording.attitude.value, axis=0)),
     )
@@ -97,10 +98,15 @@ def _is_new(value: FloatArray) -> BoolArray:
 
 
 def _away_from(time: FloatArray, moments: tuple[float, ...]) -> BoolArray:
-    keep = np.ones(len(time), dtype=bool)
-    for moment in moments:
-        keep &= np.abs(time - moment) > PARAMETER_SETTLE_S
-    return keep
+    if not moments:
+        return np.ones(len(time), dtype=bool)
+    at = np.array(moments)
+    after = np.searchsorted(at, time)
+    # Sorted, so only the moments before and after a time can be near it.
+    near = np.minimum(
+        np.abs(time - at[np.maximum(after - 1, 0)]), np.abs(time - at[after % len(at)])
+    )
+    return np.asarray(near > PARAMETER_SETTLE_S)
 
 
 def _in_gap(time: FloatArray, known: FloatArray) -> BoolArray:
@@ -132,17 +138,24 @@ def _mend_truncation(value: FloatArray) -> FloatArray:
     return np.where(value == np.trunc(value), value + 0.5 * np.sign(value), value)
 
 
-def _corrections(recording: Recording, compass: int) -> tuple[tuple[InForce, ...], FloatArray]:
-    """Corrections in force, oldest first, and the moments from which all but the first hold."""
-    moments = [-np.inf, *ardupilot.calibration_changes(recording.parameters)]
+def _corrections(
+    recording: Recording, compass: int, time: FloatArray
+) -> tuple[tuple[InForce, ...], IntArray]:
+    """Corrections in force, oldest first, the last one being that of the end; which at each time.
+
+    Only those of the times are worked out: a log may hold many changes between two readings.
+    """
+    moments = np.array([-np.inf, *ardupilot.calibration_changes(recording.parameters)])
+    last = len(moments) - 1
+    period = np.searchsorted(moments, time, side="right") - 1
+    periods, stretch = np.unique(np.append(period, last), return_inverse=True)
     in_force: list[InForce] = []
-    starts: list[float] = []
+    number = np.empty(len(periods), dtype=np.intp)
     previous: ardupilot.Calibration | None = None
-    for moment in moments:
+    for index, moment in enumerate(moments[periods].tolist()):
         calibration = ardupilot.calibration_at(recording.parameters, compass, moment)
-        if previous is not None and calibration.same_as(previous):
-            continue
+        if previous is None or not calibration.same_as(previous):
+            in_force.append(ardupilot.in_force(calibration))
         previous = calibration
-        in_force.append(ardupilot.in_force(calibration))
-        starts.append(moment)
-    return tuple(in_force), np.array(starts[1:])
+        number[index] = len(in_force) - 1
+    return tuple(in_force), number[stretch[:-1]]

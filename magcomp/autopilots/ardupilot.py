@@ -11,7 +11,6 @@ axes, mGauss, truncated to whole numbers.
 from __future__ import annotations
 
 import itertools
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
@@ -35,8 +34,26 @@ COMPASS_COUNT = 3
 COMPENSATION_SWITCH = "COMPASS_MOTCT"
 
 _AXES = ("X", "Y", "Z")
-_COMPASS_NAME = re.compile(
-    r"COMPASS_(?:(?:OFS|DIA|ODI|MOT)[23]?_[XYZ]|SCALE[23]?|MOTCT|PMOT_EN|DEV_ID[23]?)"
+# All that act on a reading, in alphabetical order. Asked for by name: a log may hold any number of
+# others.
+_COMPASS_NAMES = tuple(
+    sorted(
+        [
+            *(
+                f"COMPASS_{kind}{number}_{axis}"
+                for kind in ("OFS", "DIA", "ODI", "MOT")
+                for number in ("", "2", "3")
+                for axis in _AXES
+            ),
+            *(
+                f"COMPASS_{kind}{number}"
+                for kind in ("SCALE", "DEV_ID")
+                for number in ("", "2", "3")
+            ),
+            "COMPASS_MOTCT",
+            "COMPASS_PMOT_EN",
+        ]
+    )
 )
 
 
@@ -198,8 +215,8 @@ def calibration_at(parameters: ParameterHistory, compass: int, time: float) -> C
         Where a compass parameter of the log is not a finite number.
     """
     values = {}
-    for name in sorted(parameters.names):
-        if _COMPASS_NAME.fullmatch(name) is None:
+    for name in _COMPASS_NAMES:
+        if not parameters.of(name):
             continue
         value = parameters.at(name, time, 0.0)
         if not np.isfinite(value):
@@ -213,9 +230,7 @@ def calibration_at(parameters: ParameterHistory, compass: int, time: float) -> C
 def calibration_changes(parameters: ParameterHistory) -> tuple[float, ...]:
     """Times at which any parameter that acts on a compass reading changed its value."""
     times: set[float] = set()
-    for name in parameters.names:
-        if _COMPASS_NAME.fullmatch(name) is None:
-            continue
+    for name in _COMPASS_NAMES:
         reports = parameters.of(name)
         times.update(
             later.time
