@@ -11,11 +11,8 @@ from magcomp.mavlink.header import payload
 from magcomp.mavlink.heartbeat import Identity, identify
 from magcomp.mavlink.parameters import decode_param_value, encoding
 from magcomp.model import Vehicle
+from magcomp.sources.quantities import DEVICE_ID_NAMES
 
-_DEVICE_ID_NAMES = {
-    "ardupilot": ("COMPASS_DEV_ID", "COMPASS_DEV_ID2", "COMPASS_DEV_ID3"),
-    "px4": ("CAL_MAG0_ID", "CAL_MAG1_ID", "CAL_MAG2_ID"),
-}
 _BANNER = re.compile(r"\bV(\d+\.\d+\.\d+)")
 _RETRY_S = 0.4
 _TRIES = 8
@@ -48,7 +45,7 @@ class Identification:
     @property
     def vehicle(self) -> Vehicle:
         """Everything known so far."""
-        names = _DEVICE_ID_NAMES[self._heartbeat.autopilot]
+        names = DEVICE_ID_NAMES[self._heartbeat.autopilot]
         how = encoding(self._heartbeat.autopilot, self._capabilities)
         sent = (self._device_ids[name] for name in names if name in self._device_ids)
         ids = (_whole(decode_param_value(each, how).value) for each in sent)
@@ -107,7 +104,7 @@ class Identification:
         return questions
 
     def _known_names(self) -> tuple[str, ...]:
-        return _DEVICE_ID_NAMES[self._heartbeat.autopilot]
+        return DEVICE_ID_NAMES[self._heartbeat.autopilot]
 
     def _missing_ids(self) -> list[str]:
         return [name for name in self._known_names() if name not in self._device_ids]

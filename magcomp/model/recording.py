@@ -55,7 +55,7 @@ class Vehicle:
     firmware
         Version such as ``"4.6.3"``; empty where the recording does not say.
     device_ids
-        COMPASS_DEV_ID, COMPASS_DEV_ID2, COMPASS_DEV_ID3, in that order, as far as known and not 0.
+        Of its compasses, in the order of their parameters, as far as known and not 0.
     board
         Flight controller, as far as a live vehicle names it; empty where unknown.
     capabilities

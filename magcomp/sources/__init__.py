@@ -51,7 +51,7 @@ def read(
             recording = _read(inner, choice, progress)
         except InputError as error:
             # The user knows the archive, not where it was unpacked.
-            raise type(error)(str(error).replace(str(inner), f"in {path}")) from error
+            raise type(error)(str(error).replace(str(inner), f"{path}, unpacked,")) from error
     return replace(recording, source=str(path))
 
 

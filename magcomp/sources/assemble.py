@@ -25,6 +25,7 @@ from magcomp.sources.clock import (
 )
 from magcomp.sources.quantities import Messages, Timed
 from magcomp.sources.repeats import repeated
+from magcomp.sources.source import is_text
 from magcomp.sources.vehicles import ONLY_ONE, Choice, choose
 
 Buffer = bytes | bytearray | memoryview | ByteArray
@@ -48,8 +49,6 @@ _LATEST_STAMP = 1 << 53
 _EARLIEST_UNIX_S = 1.0e9
 
 _LOOK = 1024
-_TEXT_SHARE = 0.95
-_PRINTABLE = frozenset(range(32, 127)) | {9, 10, 13}
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,7 +172,7 @@ def _recording(decoded: Decoded, source: str, kind: str) -> Recording:
             system=who.system,
             component=who.component,
             firmware=quantities.firmware(messages),
-            device_ids=quantities.device_ids(parameters),
+            device_ids=quantities.device_ids(parameters, who.autopilot),
             capabilities=quantities.capabilities(messages),
         ),
         start_unix_s=decoded.start_unix_s,
@@ -265,7 +264,5 @@ def _look(octets: ByteArray) -> str:
     """What bytes that are no log look like, for the user."""
     if not len(octets):
         return "an empty file"
-    head = bytes(octets[:_LOOK])
-    printable = sum(octet in _PRINTABLE for octet in head)
-    kind = "text" if printable > _TEXT_SHARE * len(head) else "data"
+    kind = "text" if is_text(bytes(octets[:_LOOK])) else "data"
     return f"{len(octets)} bytes of {kind} without one sound frame"

@@ -6,6 +6,7 @@ A file is what its first bytes say, whatever its name.
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,7 @@ from pathlib import Path
 from magcomp.mavlink import stream
 from magcomp.model import Recording
 from magcomp.sources import tlog
+from magcomp.sources.source import is_text
 from magcomp.sources.vehicles import Choice
 
 Progress = Callable[[float], None]
@@ -94,18 +96,9 @@ def is_log(head: bytes) -> bool:
 
 # ---------------------------------------------------------------- text
 
-_TEXT_SHARE = 0.95
-_PRINTABLE = frozenset(range(32, 127)) | {9, 10, 13}
 # Mission Planner's and MAVProxy's NAME,VALUE and NAME VALUE, QGroundControl's five columns.
 _PARAMETER = re.compile(rb"(?:\d+\t\d+\t)?[A-Z][A-Z0-9_]{1,15}[ \t]*[,=\s][ \t]*[-+.\dxA-Fa-f]")
-_TABLE = re.compile(rb"[^,;\t]*(?:[,;\t][^,;\t]*)+")
 _MOST = 0.8
-
-
-def is_text(head: bytes) -> bool:
-    """Tell whether bytes are nearly all printable ASCII, and some are there."""
-    printable = sum(octet in _PRINTABLE for octet in head)
-    return printable > _TEXT_SHARE * len(head)
 
 
 def _lines(head: bytes) -> list[bytes]:
@@ -115,19 +108,17 @@ def _lines(head: bytes) -> list[bytes]:
     return [line.strip() for line in whole if line.strip() and not line.startswith((b"#", b"//"))]
 
 
-def _is_mostly(head: bytes, line: re.Pattern[bytes], matches: str) -> bool:
-    if not is_text(head):
-        return False
-    lines = _lines(head)
-    return sum(getattr(line, matches)(each) is not None for each in lines) > _MOST * len(lines)
-
-
 def _is_parameters(head: bytes) -> bool:
-    return _is_mostly(head, _PARAMETER, "match")
+    lines = _lines(head) if is_text(head) else []
+    return sum(_PARAMETER.match(line) is not None for line in lines) > _MOST * len(lines)
 
 
 def _is_table(head: bytes) -> bool:
-    return _is_mostly(head, _TABLE, "fullmatch")
+    """Most lines have as many separators."""
+    lines = _lines(head) if is_text(head) else []
+    columns = Counter((line.count(b","), line.count(b";"), line.count(b"\t")) for line in lines)
+    del columns[0, 0, 0]
+    return max(columns.values(), default=0) > _MOST * len(lines)
 
 
 def _is_web_page(head: bytes) -> bool:

@@ -199,9 +199,16 @@ def firmware(messages: Messages) -> str:
     return ""
 
 
-def device_ids(parameters: ParameterHistory) -> tuple[int, ...]:
-    """COMPASS_DEV_ID, 2 and 3 as last reported, without those that are 0."""
-    values = (parameters.last(f"COMPASS_DEV_ID{n}", 0.0) for n in ("", 2, 3))
+DEVICE_ID_NAMES = {
+    "ardupilot": ("COMPASS_DEV_ID", "COMPASS_DEV_ID2", "COMPASS_DEV_ID3"),
+    "px4": ("CAL_MAG0_ID", "CAL_MAG1_ID", "CAL_MAG2_ID"),
+}
+"""Parameters that tell which compasses a vehicle has, by autopilot."""
+
+
+def device_ids(parameters: ParameterHistory, autopilot: str) -> tuple[int, ...]:
+    """The compasses' device ids as last reported, without those that are 0."""
+    values = (parameters.last(name, 0.0) for name in DEVICE_ID_NAMES[autopilot])
     return tuple(int(value) for value in values if np.isfinite(value) and value)
 
 

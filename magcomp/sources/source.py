@@ -13,6 +13,14 @@ import numpy as np
 from magcomp.errors import LogError
 from magcomp.mavlink.checksum import ByteArray
 
+_TEXT_SHARE = 0.95
+_PRINTABLE = frozenset(range(32, 127)) | {9, 10, 13}
+
+
+def is_text(head: bytes) -> bool:
+    """Tell whether bytes are nearly all printable ASCII, and some are there."""
+    return sum(octet in _PRINTABLE for octet in head) > _TEXT_SHARE * len(head)
+
 
 @contextmanager
 def mapped(path: str | Path) -> Iterator[ByteArray]:
