@@ -94,7 +94,9 @@ def decode_values(field: NDArray[Any], types: NDArray[Any], how: Encoding) -> ND
     how
         As the vehicle encodes.
     """
-    values: NDArray[np.float64] = field.astype(np.float64)
+    # A signalling NaN becomes a quiet one, and no warning.
+    with np.errstate(invalid="ignore"):
+        values: NDArray[np.float64] = field.astype(np.float64)
     if how is Encoding.CAST:
         return values
     octets = np.ascontiguousarray(field).view(np.uint8).reshape(-1, _FIELD)

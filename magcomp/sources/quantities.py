@@ -41,8 +41,10 @@ Messages = Mapping[int, Timed]
 def columns(table: Table, *names: str) -> FloatArray:
     """Some fields side by side, shape (n, number of names)."""
     result = np.empty((len(table), len(names)))
-    for index, name in enumerate(names):
-        result[:, index] = table[name]
+    # A signalling NaN becomes a quiet one, and no warning.
+    with np.errstate(invalid="ignore"):
+        for index, name in enumerate(names):
+            result[:, index] = table[name]
     return result
 
 
