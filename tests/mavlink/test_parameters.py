@@ -81,13 +81,14 @@ def test_floats_travel_alike(value: float) -> None:
         assert decode_param_value(sent(b"A", *fields, REAL32), how).value == value
 
 
-@given(
-    st.lists(
-        st.tuples(
-            st.sampled_from([*RANGES, 7, 8, 9, 10, 0, 255]), st.binary(min_size=4, max_size=4)
-        )
-    )
+# Among them the bytes of signalling NaNs of either sign.
+some_fields = st.binary(min_size=4, max_size=4) | st.sampled_from(
+    [b"\1\0\x80\x7f", b"\1\0\x80\xff"]
 )
+some_types = st.sampled_from([*RANGES, 7, 8, 9, 10, 0, 255])
+
+
+@given(st.lists(st.tuples(some_types, some_fields)))
 @pytest.mark.parametrize("how", Encoding)
 def test_many_at_once_are_each_alone(how: Encoding, of: list[tuple[int, bytes]]) -> None:
     field = np.frombuffer(b"".join(data for _, data in of), dtype="<f4")
