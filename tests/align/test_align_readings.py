@@ -11,7 +11,7 @@ from synthetic import EXACT, Flown, problem_of
 from magcomp.align import controls, readings, reported, sample
 from magcomp.autopilots import ardupilot
 from magcomp.errors import MissingDataError
-from magcomp.model import Lags, ParameterChange, Recording, Series
+from magcomp.model import Lags, ParameterChange, ParameterHistory, Recording, Series
 
 
 @pytest.fixture
@@ -182,3 +182,42 @@ def test_the_stated_rates_are_the_derivatives():
     earlier = problem.sample(Lags(0.07 + step, 0.05 + step))
     assert np.allclose(here.u_rate, (later.u - earlier.u) / (2 * step), atol=0.3)
     assert np.allclose(here.down_rate, (later.down - earlier.down) / (2 * step), atol=0.01)
+
+
+# --- many changes ---------------------------------------------------------------------
+
+
+def with_changes(recording: Recording, times: np.ndarray) -> Recording:
+    """One change of an offset at each time, all values different."""
+    made = (ParameterChange(float(t), "COMPASS_OFS_X", n / 8) for n, t in enumerate(times, 1))
+    history = ParameterHistory((*recording.parameters.changes, *made))
+    return replace(recording, parameters=history)
+
+
+def test_the_cost_of_changes_is_that_of_the_readings_between_them(recording, monkeypatch):
+    asked = []
+    at = ardupilot.calibration_at
+
+    def counted(*arguments):
+        asked.append(arguments)
+        return at(*arguments)
+
+    monkeypatch.setattr(ardupilot, "calibration_at", counted)
+    bursts = np.concatenate([np.linspace(t, t + 1.0, 2000) for t in (10.0, 25.0, 40.0)])
+    kept = readings(with_changes(recording, bursts), 1)
+    assert len(asked) <= 4
+    assert len(kept.in_force) == 4
+    for edge in (10.0, 25.0, 40.0):
+        assert not ((kept.time > edge - 1.5) & (kept.time < edge + 2.5)).any()
+
+
+def test_each_reading_falls_under_the_correction_of_its_time(recording):
+    times = np.array([7.0, 9.0, 20.0, 21.0, 35.0, 59.0])
+    changed = with_changes(recording, times)
+    kept = readings(changed, 1)
+    for time, stretch in zip(kept.time, kept.stretch, strict=True):
+        assert np.abs(times - time).min() > 1.5
+        expected = ardupilot.calibration_at(changed.parameters, 1, time).offset
+        assert np.array_equal(kept.in_force[stretch].correction.offset, expected)
+    last = changed.parameters.last("COMPASS_OFS_X", 0.0)
+    assert kept.in_force[-1].correction.offset[0] == last

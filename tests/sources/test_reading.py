@@ -112,6 +112,34 @@ def test_a_second_battery_is_not_the_first() -> None:
     assert values(recording.current) == pytest.approx([3])
 
 
+def test_further_batteries_have_currents_of_their_own() -> None:
+    sender = Sender()
+    recording = recording_of(
+        sender.battery(300),
+        sender.battery(900, number=1),
+        sender.battery(-1, number=1),
+        sender.battery(1100, number=3),
+        sender.battery(-1, number=4),
+        sender.battery(700, number=1),
+    )
+    others = {number: values(series) for number, series in recording.other_currents.items()}
+    assert others == {1: [9, 7], 3: [11]}
+    assert values(recording.current) == [3]
+
+
+def test_a_battery_alone_under_another_number_is_not_a_further_one() -> None:
+    sender = Sender()
+    recording = recording_of(sender.battery(900, number=255), sender.system_status(900))
+    assert recording.other_currents == {}
+    assert values(recording.current) == [9]
+
+
+def test_a_recording_says_what_it_was_read_from() -> None:
+    assert recording_of().format == "tlog"
+    data = log([Sender().heartbeat()])
+    assert recording_from_bytes(data, "udp:14550", live=True).format == "live"
+
+
 def test_servo_outputs_have_sixteen_channels_of_the_main_port() -> None:
     sender = Sender()
     recording = recording_of(
@@ -195,6 +223,35 @@ def test_integers_of_px4_are_bytes_in_the_place_of_a_float(
     recording = recording_from_bytes(log(frames), "test.tlog")
     assert recording.vehicle.autopilot == "px4"
     assert recording.parameters.last("CAL_MAG0_ID", 0.0) == value
+
+
+def test_an_autopilot_that_says_how_its_parameters_travel_is_believed() -> None:
+    sender = Sender()
+    version = dialect.MAVLink_autopilot_version_message(
+        dialect.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_C_CAST,
+        *(0x010F_02FF, 0, 0, 0, bytes(8), bytes(8), bytes(8), 0, 0, 0),
+    )
+    frames = [
+        sender.heartbeat(autopilot=PX4),
+        sender.parameter("CAL_MAG0_ID", 197_388, 6),
+        sender.frame(version),
+    ]
+    recording = recording_from_bytes(log(frames), "test.tlog")
+    assert recording.parameters.last("CAL_MAG0_ID", 0.0) == 197_388
+    assert recording.vehicle.device_ids == (197_388,)
+    assert recording.vehicle.capabilities == 1 << 17
+
+
+def test_a_px4_vehicle_comes_out_with_all_its_log_says() -> None:
+    sender = Sender()
+    frames = [sender.heartbeat(autopilot=PX4), sender.scaled_imu(5000, 1, mag=(1, 2, 3))]
+    for number, device in enumerate((197_388, 197_644)):
+        (as_float,) = struct.unpack("<f", struct.pack("<i", device))
+        frames.append(sender.parameter(f"CAL_MAG{number}_ID", as_float, 6))
+    recording = recording_from_bytes(log(frames), "test.tlog")
+    assert (recording.vehicle.autopilot, recording.vehicle.kind) == ("px4", "copter")
+    assert recording.vehicle.device_ids == (197_388, 197_644)
+    assert values(recording.field[1]) == [[1, 2, 3]]
 
 
 def test_integers_of_ardupilot_are_floats() -> None:
