@@ -6,16 +6,18 @@ code that reads a log, and gives the same numbers. Over its bound:
 1. Streams faster than 20 Hz are halved, the oldest block of ten seconds first, then
    the next, and again, until none is above 20 Hz. Compasses are read at 10 Hz: what goes
    are mostly repeats.
-2. After that the oldest blocks go. The vehicle's parameters and identity stay for ever;
-   only reports that repeat the value before them go.
+2. After that the oldest blocks go. The vehicle's parameters and identity stay; only reports that
+   repeat the value before them go.
+3. Where those alone are more than a quarter of the bound, as no sound vehicle's are, the oldest go.
 """
 
 from __future__ import annotations
 
 import math
 import threading
-from collections import Counter
+from collections import Counter, deque
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +43,8 @@ BANDS, SECTORS = 6, 12
 
 _BLOCK_US = 10_000_000
 _FASTEST_HZ = 20.0
+_KEPT_SHARE = 4
+_MOST_BLOCKS = 2048
 _PINNED = frozenset({Message.PARAM_VALUE, Message.AUTOPILOT_VERSION, Message.STATUSTEXT})
 _TYPICAL_DIP = math.radians(60.0)
 
@@ -71,13 +75,24 @@ class Coverage:
 
 @dataclass
 class _Block:
-    """Consecutive records of about ten seconds."""
+    """Consecutive records of about ten seconds, or a little part of the bound."""
 
     begin_us: int
     end_us: int
     records: bytearray = field(default_factory=bytearray)
     thinned: int = 0
     at_floor: bool = False
+
+
+_Key = tuple[tuple[int, int, int], bytes]
+
+
+class _Kept(NamedTuple):
+    """A record that outlives its block: of which parameter, what value, and all of it."""
+
+    key: _Key
+    value: bytes
+    record: bytes
 
 
 class Buffer:
@@ -88,7 +103,7 @@ class Buffer:
     source
         Address of the link, for people.
     limit
-        Bytes to keep at most, parameters and identity aside.
+        Bytes to keep at most; for parameters and identity a quarter of it more.
     dip_rad
         Dip of the field whose directions the coverage counts. Its exact value does not
         matter: it only says where on the sphere a level turn lies.
@@ -101,8 +116,9 @@ class Buffer:
         self._limit = limit
         self._size = 0
         self._blocks: list[_Block] = []
-        self._kept = bytearray()
-        self._kept_values: dict[tuple[tuple[int, int, int], bytes], bytes] = {}
+        self._kept: deque[_Kept] = deque()
+        self._kept_size = 0
+        self._kept_last: dict[_Key, _Kept] = {}
         self._lock = threading.Lock()
         self._field = (math.cos(dip_rad), math.sin(dip_rad))
         self._level = 0
@@ -112,7 +128,7 @@ class Buffer:
     def size(self) -> int:
         """Bytes held."""
         with self._lock:
-            return self._size + len(self._kept)
+            return self._size + self._kept_size
 
     def add(self, unix_us: int, frame: bytes) -> None:
         """Take one whole frame that arrived at ``unix_us``; what no fit needs is passed over."""
@@ -131,7 +147,8 @@ class Buffer:
     def data(self) -> bytes:
         """Give everything held, in the form of a .tlog."""
         with self._lock:
-            return b"".join([self._kept, *(block.records for block in self._blocks)])
+            kept = (entry.record for entry in self._kept)
+            return b"".join([*kept, *(block.records for block in self._blocks)])
 
     def snapshot(self, system: int | None = None, component: int | None = None) -> Recording:
         """Give the recording so far, read as a log of the same frames would be.
@@ -184,8 +201,11 @@ class Buffer:
 
     def _block(self, unix_us: int) -> _Block:
         last = self._blocks[-1] if self._blocks else None
-        # A clock set back must not make a block that never ends.
-        if last is None or not 0 <= unix_us - last.begin_us < _BLOCK_US:
+        # A clock set back must not make a block that never ends, nor one that jumps many blocks.
+        if last is None or (
+            not 0 <= unix_us - last.begin_us < _BLOCK_US
+            and len(last.records) * _MOST_BLOCKS >= self._limit
+        ):
             last = _Block(unix_us, unix_us)
             self._blocks.append(last)
         return last
@@ -230,9 +250,20 @@ class Buffer:
             content, value = payload(frame), b""
             if stream[2] == Message.PARAM_VALUE:
                 content, value = name_and_field(content)
-            if self._kept_values.get((stream, content)) != value:
-                self._kept_values[stream, content] = value
-                self._kept += whole
+            self._keep(_Kept((stream, content), value, whole))
+
+    def _keep(self, entry: _Kept) -> None:
+        last = self._kept_last.get(entry.key)
+        if last is not None and last.value == entry.value:
+            return
+        self._kept.append(entry)
+        self._kept_last[entry.key] = entry
+        self._kept_size += len(entry.record)
+        while self._kept_size > self._limit // _KEPT_SHARE:
+            oldest = self._kept.popleft()
+            self._kept_size -= len(oldest.record)
+            if self._kept_last[oldest.key] is oldest:
+                del self._kept_last[oldest.key]
 
 
 def sphere_cell(x: float, y: float, z: float) -> int:

@@ -193,6 +193,29 @@ class TestBoundedMemory:
         assert buffer.size <= self.LIMIT + 20 * 60
         assert len(buffer.snapshot().parameters.names) == 20
 
+    def test_a_flood_of_parameters_and_texts_stays_under_the_bound_too(self):
+        buffer = Buffer("x", limit=self.LIMIT)
+        flight = Flight(buffer)
+        for index in range(40):
+            for number in range(200):
+                flight.parameter(f"P{index}_{number}", float(number), index * 20.0)
+                flight.parameter("SAME", float(number), index * 20.0)
+                line = f"text {index} {number}".encode()
+                flight.say(mavlink.MAVLink_statustext_message(6, line), index * 20.0)
+            flight.step = index * 1000
+            flight.fly(20)
+            assert buffer.size <= self.LIMIT * 5 // 4
+            assert len(buffer.data()) == buffer.size
+        assert buffer.snapshot().parameters.last("P39_199", 0.0) == 199.0
+
+    def test_a_clock_that_jumps_with_each_frame_makes_no_block_of_each(self):
+        buffer, vehicle = Buffer("x", limit=self.LIMIT), FakeVehicle()
+        for index in range(20_000):
+            jump = (index * 7_919) % 1_000 * 60_000_000
+            buffer.add(UNIX_US + jump, vehicle.attitude(index * 0.02))
+        assert self.LIMIT // 2 < buffer.size <= self.LIMIT
+        assert len(buffer._blocks) <= 2 * 2048
+
     def test_a_clock_set_back_does_not_break_the_bound(self):
         buffer = Buffer("x", limit=self.LIMIT)
         flight = Flight(buffer)

@@ -19,7 +19,7 @@ from magcomp.sources.vehicles import Choice
 
 Progress = Callable[[float], None]
 
-HEAD = 1 << 13
+HEAD = 1 << 12
 """First bytes of a file that say what it is."""
 
 

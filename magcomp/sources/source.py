@@ -14,12 +14,12 @@ from magcomp.errors import LogError
 from magcomp.mavlink.checksum import ByteArray
 
 _TEXT_SHARE = 0.95
-_PRINTABLE = frozenset(range(32, 127)) | {9, 10, 13}
+_PRINTABLE = bytes([9, 10, 13, *range(32, 127)])
 
 
 def is_text(head: bytes) -> bool:
     """Tell whether bytes are nearly all printable ASCII, and some are there."""
-    return sum(octet in _PRINTABLE for octet in head) > _TEXT_SHARE * len(head)
+    return len(head) - len(head.translate(None, _PRINTABLE)) > _TEXT_SHARE * len(head)
 
 
 @contextmanager

@@ -227,6 +227,13 @@ def test_a_zip_that_lies_about_its_size_is_refused(tmp_path: Path) -> None:
     assert "damaged" in refusal(lying_zip(tmp_path))
 
 
+def test_a_size_beyond_the_bound_need_only_be_announced(tmp_path: Path) -> None:
+    path = zipped(tmp_path, **{"a.tlog": TLOG})
+    size = len(TLOG).to_bytes(4, "little")
+    data = path.read_bytes().replace(size, (0x7FFF_0000).to_bytes(4, "little"))
+    assert "at most 1024 MB" in refusal(written(tmp_path, data, "announced.zip"))
+
+
 def test_a_locked_zip_is_refused(tmp_path: Path) -> None:
     path = zipped(tmp_path, **{"a.tlog": TLOG})
     data = bytearray(path.read_bytes())
