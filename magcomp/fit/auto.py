@@ -12,11 +12,13 @@ from magcomp.fit.flight import (
     FIELD_LAG,
     GROUPS,
     REGRESSOR_LAG,
+    SIZE,
     STRENGTH,
     Problem,
     correction_of,
     estimate,
     estimate_lags,
+    is_calibrated,
     lags_of,
     vertical_of,
 )
@@ -123,6 +125,7 @@ def refit(problem: Problem, fit: MotorFit, keep: BoolArray) -> MotorFit:
         [
             pack(fit.correction),
             [fit.strength, fit.vertical / fit.strength, fit.lags.field, fit.lags.regressor],
+            np.zeros(SIZE - CORRECTION_SIZE - 4),
         ]
     )
     found = estimate(part, _groups(fit), start=start, hold_lags=True, with_covariance=False)
@@ -173,6 +176,8 @@ def _choose_freedom(problem: Problem) -> tuple[Estimate, int]:
     Admissible is what the data determine: see :func:`is_determined`. Candidates are compared at
     the lags of the most open fit; the chosen one estimates its own.
     """
+    if not is_calibrated(problem.readings.in_force[-1].correction):
+        return estimate(problem, _MOST_FREE), _MOST_FREE
     most, opened = _most_open(problem)
     least = _typical(opened.noise)
     for free in range(1, most):
@@ -195,12 +200,22 @@ def _choose_freedom(problem: Problem) -> tuple[Estimate, int]:
 
 
 def _most_open(problem: Problem) -> tuple[int, Estimate]:
-    """The most open fit whose parameters the data determine; with motors alone, always."""
-    for free in range(_MOST_FREE, 1, -1):
+    """The most open fit whose parameters the data determine.
+
+    With motors alone where they determine no more, unless the data contradict the calibration in
+    force: then the open fit stands with its wide covariance, for undetermined means unknown.
+    """
+    widest = estimate(problem, _MOST_FREE)
+    if is_determined(widest, problem.earth.strength):
+        return _MOST_FREE, widest
+    for free in range(_MOST_FREE - 1, 1, -1):
         found = estimate(problem, free)
         if is_determined(found, problem.earth.strength):
             return free, found
-    return 1, estimate(problem, 1)
+    closed = estimate(problem, 1)
+    if _typical(closed.noise) > WORTH * _typical(widest.noise):
+        return _MOST_FREE, widest
+    return 1, closed
 
 
 def is_determined(found: Estimate, strength: float) -> bool:

@@ -19,6 +19,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.signal import lfilter
 
 from magcomp.align import sample, within
 from magcomp.earth import EarthField
@@ -32,6 +33,7 @@ from magcomp.model import (
     Control,
     Correction,
     FloatArray,
+    IntArray,
     Lags,
     Readings,
     Samples,
@@ -41,7 +43,17 @@ from magcomp.model import (
 )
 
 STRENGTH, SIN_DIP, FIELD_LAG, REGRESSOR_LAG = range(CORRECTION_SIZE, CORRECTION_SIZE + 4)
-SIZE = CORRECTION_SIZE + 4
+TILT, LEAN = (
+    slice(CORRECTION_SIZE + 4, CORRECTION_SIZE + 6),
+    slice(CORRECTION_SIZE + 6, CORRECTION_SIZE + 8),
+)
+SIZE = CORRECTION_SIZE + 8
+
+TILT_WIDTH_RAD = np.radians(0.5)
+"""Autopilots level their attitude to about this: constant errors of roll and of pitch."""
+
+LEAN_WIDTH, LEAN_S = 0.1, 4.0
+"""Radians of attitude error a radian of lean held for seconds, and how soon it comes."""
 
 LAG_MEAN_S, LAG_WIDTH_S, LAG_MOST_S = 0.08, 0.1, 0.6
 """AUTOPILOTS.md, Timing: the field lags by 0.05–0.1 s, the current by something of that order."""
@@ -58,7 +70,19 @@ TRUSTED_SOFT_IRON = 0.005
 
 OPEN_OFFSET_MGAUSS = 300.0
 OPEN_SOFT_IRON = 0.15
+
+UNPROVEN_OFFSET_MGAUSS, UNPROVEN_SOFT_IRON = 12.0, 0.015
+"""How far an ordinary calibration is off where the data cannot contradict it."""
+
+NEVER_CALIBRATED_MGAUSS = 20.0
+"""Offsets shorter than this beside an untouched soft iron are what a vehicle is delivered with."""
+
 BLOCK_S = 5.0
+
+DRIFT_S = 30.0
+"""Drift of real sensors and attitude filters is alike for about this long."""
+
+_LEAST_BLOCKS = 12
 
 GROUPS = ("motor", "offset", "diagonal", "off-diagonal")
 _DIAGONAL, _OFF_DIAGONAL = slice(6, 9), slice(9, 12)
@@ -102,6 +126,15 @@ class Problem:
         return sample(self.readings, self.control, in_force, lags)
 
 
+def is_calibrated(present: Correction) -> bool:
+    """Whether anybody ever calibrated this compass.
+
+    Offsets of zero beside a soft iron of one are no calibration at zero; they are none.
+    """
+    untouched = np.array_equal(present.soft_iron, np.eye(3))
+    return not (untouched and float(np.linalg.norm(present.offset)) < NEVER_CALIBRATED_MGAUSS)
+
+
 def prior(problem: Problem, free: int) -> Prior:
     """What is known before the data, with the first ``free`` groups of :data:`GROUPS` open."""
     present = problem.readings.in_force[-1].correction
@@ -120,6 +153,7 @@ def prior(problem: Problem, free: int) -> Prior:
     width[STRENGTH] = (1e-4 if free >= 3 else SCALE_WIDTH) * earth.strength
     width[SIN_DIP] = DIP_WIDTH
     width[[FIELD_LAG, REGRESSOR_LAG]] = LAG_WIDTH_S
+    width[TILT], width[LEAN] = TILT_WIDTH_RAD, LEAN_WIDTH
     return Prior(mean, width)
 
 
@@ -166,7 +200,7 @@ def estimate(
         rows = problem.sample(lags_of(parameters)) if fixed is None else fixed
         return strength_and_dip(rows, parameters)
 
-    blocks = time_blocks(problem.readings.time, BLOCK_S) if with_covariance else None
+    blocks = drift_blocks(problem.readings.time) if with_covariance else None
     return solve(
         residuals,
         begin,
@@ -177,6 +211,12 @@ def estimate(
         rounds=rounds,
         feasible=is_physical,
     )
+
+
+def drift_blocks(time: FloatArray) -> IntArray:
+    """Blocks as long as the drift of sensors and attitude, a dozen of them at least."""
+    duration = float(time[-1] - time[0]) if len(time) else 0.0
+    return time_blocks(time, float(np.clip(duration / _LEAST_BLOCKS, BLOCK_S, DRIFT_S)))
 
 
 def estimate_lags(problem: Problem, correction: Correction) -> tuple[Lags, Lags]:
@@ -229,38 +269,79 @@ def is_physical(parameters: FloatArray) -> bool:
 
 
 def strength_and_dip(samples: Samples, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Residuals in mGauss, shape (n, 2), and their derivatives, shape (n, 2, 16)."""
+    """Residuals in mGauss of sensor field, shape (n, 2), and derivatives, shape (n, 2, SIZE).
+
+    Notes
+    -----
+    The sensor's noise is alike on its axes, so the distance that counts is that in sensor axes
+    between a reading and the nearest field the model allows: D⁻¹ · (b − M·u) − offset with b the
+    earth's field at the known gravity and *any* heading. The heading is eliminated: of the three
+    components the one along which it moves the reading is left out, and the two that remain are
+    taken along the field (strength) and across it (dip). Slopes are those of the model's field,
+    not of the noisy reading, so noise is not taken for soft iron (errors in variables).
+    """
     correction = unpack(parameters[:CORRECTION_SIZE])
-    centred = samples.raw + correction.offset
+    strength, sine = parameters[STRENGTH], np.clip(parameters[SIN_DIP], -0.999, 0.999)
+    cosine = np.sqrt(1.0 - sine**2)
+    inverse: FloatArray = np.linalg.inv(correction.soft_iron).astype(np.float64)
     corrected = correction.apply(samples.raw, samples.u)
-    size = np.linalg.norm(corrected, axis=1)
-    along = corrected / size[:, None]
-    residuals = np.stack(
-        [
-            size - parameters[STRENGTH],
-            np.einsum("ij,ij->i", corrected, samples.down)
-            - parameters[STRENGTH] * parameters[SIN_DIP],
-        ],
-        axis=1,
-    )
-    slopes = np.zeros((len(samples), 2, SIZE))
-    shift = samples.raw_rate @ correction.soft_iron.T - np.multiply.outer(
-        samples.u_rate, correction.motor
-    )
-    for kind, direction in enumerate((along, samples.down)):
+    down = samples.down
+    level = corrected - np.einsum("ij,ij->i", corrected, down)[:, None] * down
+    north = level / np.maximum(np.linalg.norm(level, axis=1), 1e-9)[:, None]
+    earth = strength * (cosine * north + sine * down)
+    along, across = _axes(earth, down, inverse)
+    apart = (corrected - earth) @ inverse.T
+    centred = (earth - np.multiply.outer(samples.u, correction.motor)) @ inverse.T
+    slopes = np.empty((len(samples), 2, SIZE))
+    for kind, axis in enumerate((along, across)):
+        pulled = axis @ inverse
         rows = slopes[:, kind, :]
-        rows[:, MOTOR] = direction * samples.u[:, None]
-        rows[:, OFFSET] = direction @ correction.soft_iron
-        rows[:, _DIAGONAL] = direction * centred
-        rows[:, 9] = direction[:, 0] * centred[:, 1] + direction[:, 1] * centred[:, 0]
-        rows[:, 10] = direction[:, 0] * centred[:, 2] + direction[:, 2] * centred[:, 0]
-        rows[:, 11] = direction[:, 1] * centred[:, 2] + direction[:, 2] * centred[:, 1]
-        rows[:, REGRESSOR_LAG] = np.einsum("ij,ij->i", direction, shift)
-    slopes[:, 0, STRENGTH] = -1.0
-    slopes[:, 1, STRENGTH] = -parameters[SIN_DIP]
-    slopes[:, 1, SIN_DIP] = -parameters[STRENGTH]
-    slopes[:, 1, FIELD_LAG] = -np.einsum("ij,ij->i", corrected, samples.down_rate)
-    return residuals, slopes
+        rows[:, MOTOR] = pulled * samples.u[:, None]
+        rows[:, OFFSET] = axis
+        rows[:, _DIAGONAL] = pulled * centred
+        for column, (i, j) in enumerate(((0, 1), (0, 2), (1, 2)), start=9):
+            rows[:, column] = pulled[:, i] * centred[:, j] + pulled[:, j] * centred[:, i]
+        rows[:, STRENGTH] = -np.einsum("ij,ij->i", pulled, earth) / strength
+        rows[:, SIN_DIP] = -strength * np.einsum("ij,ij->i", pulled, down - sine / cosine * north)
+        # A turn w of the body moves the field in body axes by w × b, which b × pulled weighs.
+        turned = np.cross(earth, pulled)
+        rows[:, FIELD_LAG] = np.einsum("ij,ij->i", turned, np.cross(down, samples.down_rate))
+        rows[:, TILT] = -turned[:, :2]
+        rows[:, LEAN] = -turned[:, :2] * _leaning(samples)
+        rows[:, REGRESSOR_LAG] = np.einsum("ij,ij->i", axis, samples.raw_rate) - (
+            pulled @ correction.motor * samples.u_rate
+        )
+    nuisance = parameters[CORRECTION_SIZE + 4 :]
+    residuals = np.stack(
+        [np.einsum("ij,ij->i", along, apart), np.einsum("ij,ij->i", across, apart)], axis=1
+    )
+    return residuals + slopes[:, :, CORRECTION_SIZE + 4 :] @ nuisance, slopes
+
+
+def _axes(
+    earth: FloatArray, down: FloatArray, inverse: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Unit vectors in sensor axes along the field and across it, both square to a turn."""
+    turn = np.cross(down, earth) @ inverse.T
+    turn /= np.maximum(np.linalg.norm(turn, axis=1), 1e-9)[:, None]
+    along = earth @ inverse.T
+    along -= np.einsum("ij,ij->i", along, turn)[:, None] * turn
+    along /= np.maximum(np.linalg.norm(along, axis=1), 1e-9)[:, None]
+    return along, np.cross(turn, along)
+
+
+def _leaning(samples: Samples) -> FloatArray:
+    """Roll and pitch, slowly followed: what acceleration does to an attitude filter, (n, 2).
+
+    A multirotor accelerates where it leans, and its attitude filter takes the acceleration for
+    gravity within a few seconds.
+    """
+    if len(samples) < 2:
+        return np.zeros((len(samples), 2))
+    step = max(float(np.median(np.diff(samples.time))), 1e-3)
+    share = step / (LEAN_S + step)
+    tilt = samples.attitude[:, :2] - np.median(samples.attitude[:, :2], axis=0)
+    return np.asarray(lfilter([share], [1.0, share - 1.0], tilt, axis=0))
 
 
 def vertical_of(parameters: FloatArray) -> float:

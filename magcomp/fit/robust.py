@@ -131,9 +131,16 @@ def solve(
         previous, scale = scale, _spread(values, noise_floor)
         if np.all(np.abs(scale / previous - 1) < 0.02):
             break
-    weights = _weights(values / scale) / scale**2
+    weights = _weights(values / scale)
     covariance = (
-        _covariance(values, slopes, weights, prior if doubt is None else doubt, blocks)
+        _covariance(
+            values,
+            slopes,
+            weights / scale**2,
+            weights**3 / scale**2,
+            prior if doubt is None else doubt,
+            blocks,
+        )
         if blocks is not None
         else np.zeros((len(parameters), len(parameters)))
     )
@@ -218,6 +225,7 @@ def _covariance(
     values: FloatArray,
     slopes: FloatArray,
     weights: FloatArray,
+    bend: FloatArray,
     prior: Prior,
     blocks: IntArray,
 ) -> FloatArray:
@@ -226,7 +234,8 @@ def _covariance(
     size = int(moving.sum())
     design = _columns(slopes, moving)
     flat = design.reshape(-1, size)
-    data = flat.T @ (flat * weights.reshape(-1, 1))
+    # The slope of the score: d(w·z)/dz of the soft-L1 loss is w³, not w.
+    data = flat.T @ (flat * bend.reshape(-1, 1))
     precision = np.diag(prior.precision[moving])
     bread = np.linalg.pinv(data + precision + 1e-12 * np.eye(size), hermitian=True)
     scores = np.einsum("ngi,ng,ng->ni", design, weights, values, optimize=True)

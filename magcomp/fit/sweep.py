@@ -10,8 +10,13 @@ from magcomp.fit.flight import (
     LAG_MEAN_S,
     LAG_MOST_S,
     LAG_WIDTH_S,
+    OPEN_OFFSET_MGAUSS,
+    OPEN_SOFT_IRON,
     TRUSTED_SOFT_IRON,
+    UNPROVEN_OFFSET_MGAUSS,
+    UNPROVEN_SOFT_IRON,
     Problem,
+    is_calibrated,
 )
 from magcomp.fit.line import line_through
 from magcomp.fit.robust import Prior, solve, time_blocks
@@ -19,6 +24,8 @@ from magcomp.fit.steady import steady_levels
 from magcomp.model import (
     CORRECTION_SIZE,
     MOTOR,
+    OFFSET,
+    SOFT_IRON,
     Correction,
     FloatArray,
     Lags,
@@ -135,7 +142,7 @@ def _answer(
     shape, slope = present.soft_iron, parameters[_SLOPE]
     samples = problem.sample(Lags(0.0, float(parameters[_LAG])))
     correction = Correction(present.offset, shape, -shape @ slope)
-    full = np.zeros((CORRECTION_SIZE, CORRECTION_SIZE))
+    full = np.diag(_unseen_variance(present))
     doubt = TRUSTED_SOFT_IRON**2 * float(slope @ slope) * np.eye(3)
     full[MOTOR, MOTOR] = shape @ covariance[_SLOPE, _SLOPE] @ shape.T + doubt
     corrected = correction.apply(samples.raw, samples.u)
@@ -163,6 +170,15 @@ def _answer(
         u_high=float(np.quantile(samples.u, 0.98)),
         count=len(samples),
     )
+
+
+def _unseen_variance(present: Correction) -> FloatArray:
+    """Variances of the 12 parameters a vehicle at rest cannot show; of the motor vector, 0."""
+    known = is_calibrated(present)
+    variance = np.zeros(CORRECTION_SIZE)
+    variance[OFFSET] = (UNPROVEN_OFFSET_MGAUSS if known else OPEN_OFFSET_MGAUSS) ** 2
+    variance[SOFT_IRON] = (UNPROVEN_SOFT_IRON if known else OPEN_SOFT_IRON) ** 2
+    return variance
 
 
 def _levels(

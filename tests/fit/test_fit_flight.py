@@ -104,7 +104,7 @@ def test_a_poor_flight_leans_on_the_calibration_in_force(seed):
 
 @pytest.mark.parametrize("compensated", [False, True], ids=["off", "current in force"])
 def test_the_stated_derivatives_are_those_of_the_residuals(compensated):
-    """All sixteen: motor, offset, soft iron, strength, dip and both lags."""
+    """All twenty: motor, offset, soft iron, strength, dip, both lags, tilt and lean."""
     in_force = None
     if compensated:
         wrong = replace(EXACT, motor=np.array([3.0, 2.0, -1.0]))
@@ -120,7 +120,13 @@ def test_the_stated_derivatives_are_those_of_the_residuals(compensated):
 
     _, stated = residuals(at)
     steps = np.concatenate(
-        [np.full(3, 1e-3), np.full(3, 1e-2), np.full(6, 1e-5), [1e-2, 1e-5, 0.04, 0.04]]
+        [
+            np.full(3, 1e-3),
+            np.full(3, 1e-2),
+            np.full(6, 1e-5),
+            [1e-2, 1e-5, 0.04, 0.04],
+            np.full(4, 1e-3),
+        ]
     )
     inside = slice(10, -10)
     for index, step in enumerate(steps):
