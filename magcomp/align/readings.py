@@ -149,13 +149,14 @@ def _corrections(
     last = len(moments) - 1
     period = np.searchsorted(moments, time, side="right") - 1
     periods, stretch = np.unique(np.append(period, last), return_inverse=True)
+    unseen = ardupilot.unseen_names(recording.parameters, compass)
     in_force: list[InForce] = []
     number = np.empty(len(periods), dtype=np.intp)
     previous: ardupilot.Calibration | None = None
     for index, moment in enumerate(moments[periods].tolist()):
         calibration = ardupilot.calibration_at(recording.parameters, compass, moment)
         if previous is None or not calibration.same_as(previous):
-            in_force.append(ardupilot.in_force(calibration))
+            in_force.append(ardupilot.in_force(calibration, unseen))
         previous = calibration
         number[index] = len(in_force) - 1
     return tuple(in_force), number[stretch[:-1]]

@@ -156,7 +156,22 @@ def vector_parameters(kind: str, compass: int, vector: ArrayLike) -> dict[str, f
     }
 
 
-def in_force(calibration: Calibration) -> InForce:
+def unseen_names(parameters: ParameterHistory, compass: int) -> tuple[str, ...]:
+    """Parameters that act on a compass and were never reported, in the order of the firmware.
+
+    Notes
+    -----
+    Every firmware has COMPASS_OFS, COMPASS_MOT and COMPASS_MOTCT. Those without soft iron have
+    neither COMPASS_DIA nor COMPASS_ODI; one of them alone is a list with a gap.
+    """
+    soft_iron = (*vector_names("DIA", compass), *vector_names("ODI", compass))
+    wanted = [*vector_names("OFS", compass), *vector_names("MOT", compass), COMPENSATION_SWITCH]
+    if any(name in parameters.names for name in soft_iron):
+        wanted += soft_iron
+    return tuple(name for name in wanted if name not in parameters.names)
+
+
+def in_force(calibration: Calibration, unseen: tuple[str, ...] = ()) -> InForce:
     """What a calibration does to a reading, in magcomp's own terms."""
     return InForce(
         correction=Correction(
@@ -165,6 +180,7 @@ def in_force(calibration: Calibration) -> InForce:
             motor=calibration.motor,
         ),
         regressor=_REGRESSOR_OF.get(calibration.compensation),
+        unseen=unseen,
     )
 
 

@@ -87,10 +87,13 @@ class InForce:
         Hard and soft iron and motor correction.
     regressor
         The control quantity ``correction.motor`` was multiplied by; None where it was off.
+    unseen
+        Parameters that make the correction and that the recording does not tell.
     """
 
     correction: Correction
     regressor: str | None
+    unseen: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
