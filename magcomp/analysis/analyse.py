@@ -20,6 +20,7 @@ from magcomp.model import (
     Analysis,
     CompassResult,
     Control,
+    Grade,
     MotorFit,
     Recording,
     Verdict,
@@ -254,11 +255,17 @@ def _choose(judged: Mapping[str, list[_Judged]]) -> str:
     """The control quantity that predicts held-out data better; current where it is close."""
 
     def unexplained(kind: str) -> float:
-        logs = [np.log(max(j.verdict.residual.held_out, 1e-6)) for j in judged[kind]]
+        # A sweep's residual rows have three components, the others' two.
+        logs = [
+            np.log(max(j.verdict.residual.held_out, 1e-6) / np.sqrt(2 + (j.fit.method == "sweep")))
+            for j in judged[kind]
+        ]
         return float(np.exp(np.mean(logs)))
 
     if len(judged) == 1:
         return next(iter(judged))
+    if all(j.verdict.grade is Grade.REJECTED for j in judged[THROTTLE]):
+        return CURRENT
     return THROTTLE if unexplained(THROTTLE) < BETTER * unexplained(CURRENT) else CURRENT
 
 

@@ -82,8 +82,8 @@ def heading_errors(
             HeadingError(
                 u=float(u),
                 before=largest_shift(before, field, roll, pitch),
-                after=float(np.degrees(np.median(largest))),
-                p95=float(np.degrees(np.quantile(largest, 0.95))),
+                after=min(float(np.degrees(np.median(largest))), 180.0),
+                p95=min(float(np.degrees(np.quantile(largest, 0.95))), 180.0),
             )
         )
     return tuple(rows)

@@ -13,6 +13,7 @@ from magcomp.judge.evidence import cover, field_residual, used_lags
 from magcomp.judge.heading_error import control_grid, heading_errors
 from magcomp.judge.thresholds import Thresholds
 from magcomp.model import (
+    CORRECTION_SIZE,
     CURRENT,
     MOTOR,
     Coverage,
@@ -75,7 +76,10 @@ def judge(
         fit, problem.readings.in_force[-1].correction, _present_control(problem, samples, fit), rng
     )
     covered = cover(samples, fit.correction.apply(samples.raw, samples.u))
-    findings = list(_findings(fit, errors, residual, covered, limits))
+    findings = [
+        *_on_unseen_parameters(problem.readings.in_force[-1].unseen),
+        *_findings(fit, errors, residual, covered, limits),
+    ]
     grade = max((f.grade for f in findings), key=_severity, default=Grade.GOOD)
     summary = _summary(fit, errors, residual)
     reasons = tuple(
@@ -100,7 +104,11 @@ def _widened(fit: MotorFit, motors: FloatArray) -> MotorFit:
     jackknife = (count - 1) / count * np.sum((motors - motors.mean(axis=0)) ** 2, axis=0)
     stated = np.maximum(np.diag(fit.covariance)[MOTOR], 1e-18)
     factor = max(1.0, float(np.mean(jackknife / stated)))
-    return replace(fit, covariance=fit.covariance * factor * UNSEEN**2)
+    scale = np.full(CORRECTION_SIZE, np.sqrt(factor) * UNSEEN)
+    if fit.method == "sweep":
+        # What a vehicle at rest cannot show does not scatter between its folds either.
+        scale[MOTOR.stop :] = 1.0
+    return replace(fit, covariance=fit.covariance * np.outer(scale, scale))
 
 
 def _present_control(problem: Problem, samples: Samples, fit: MotorFit) -> FloatArray:
@@ -125,6 +133,17 @@ def _findings(
     yield from _on_unseen(fit, errors, residual, limits)
     yield from _on_bound(fit, errors, limits)
     yield from _on_shape(fit, residual, covered, limits)
+
+
+def _on_unseen_parameters(unseen: tuple[str, ...]) -> Iterator[_Finding]:
+    if unseen:
+        some = ", ".join(unseen[:3]) + (f" and {len(unseen) - 3} more" if len(unseen) > 3 else "")
+        yield _Finding(
+            Grade.REJECTED,
+            f"what was in force is unknown, because {some} {'is' if len(unseen) == 1 else 'are'} "
+            "not in the log: let the ground station fetch the whole parameter list while it "
+            "records, or take the log of the autopilot's card",
+        )
 
 
 def _on_control(fit: MotorFit, covered: Coverage, limits: Thresholds) -> Iterator[_Finding]:
@@ -178,16 +197,32 @@ def _fall(residual: FieldResidual) -> float:
 def _on_bound(
     fit: MotorFit, errors: tuple[HeadingError, ...], limits: Thresholds
 ) -> Iterator[_Finding]:
-    at_top = error_at(errors, fit.u_high)
-    if at_top.p95 <= limits.good_deg:
+    flown = [row for row in errors if row.u < fit.u_high]
+    top = error_at(errors, fit.u_high)
+    worst = max((*flown, top), key=lambda row: row.p95)
+    if worst.p95 <= limits.good_deg:
         return
-    tolerable = max(limits.marginal_deg, limits.lesser_evil * at_top.before)
-    grade = Grade.MARGINAL if at_top.p95 <= tolerable else Grade.REJECTED
+    tolerable = max(limits.marginal_deg, limits.lesser_evil * worst.before)
+    tolerable = min(tolerable, limits.useless_deg)
+    if fit.method == "sweep" and _of_motors(errors[0], top) <= tolerable:
+        yield _Finding(
+            Grade.MARGINAL,
+            f"what the motors add is known, but the heading could still be wrong by "
+            f"{worst.p95:.1f}° whatever they do: a vehicle that stands still cannot show whether "
+            "its calibration is right; fly, and turn all the way round",
+        )
+        return
+    grade = Grade.MARGINAL if worst.p95 <= tolerable else Grade.REJECTED
     yield _Finding(
         grade,
-        f"the heading could still be wrong by {at_top.p95:.1f}° at {_quantity(fit, at_top.u)}: "
+        f"the heading could still be wrong by {worst.p95:.1f}° at {_quantity(fit, worst.u)}: "
         "record longer, turn all the way round and use the whole range of throttle",
     )
+
+
+def _of_motors(rest: HeadingError, top: HeadingError) -> float:
+    """The part of the bound that grows with the control quantity, degrees."""
+    return float(np.sqrt(max(top.p95**2 - rest.p95**2, 0.0)))
 
 
 def _on_shape(

@@ -12,7 +12,7 @@ class Thresholds:
     Attributes
     ----------
     good_deg, marginal_deg
-        95 % bound of the heading error at the largest control quantity the data cover.
+        95 % bound of the heading error from 0 to the largest control quantity the data cover.
     improvement
         Share by which the held-out field variation must fall where the fit claims a change
         larger than its own uncertainty.
@@ -30,9 +30,11 @@ class Thresholds:
     lesser_evil
         A bound beyond ``marginal_deg`` is still marginal, not rejected, where it is below this
         share of the error in force.
+    useless_deg
+        A bound beyond this is rejected whatever was in force.
     """
 
-    good_deg: float = 3.0
+    good_deg: float = 2.0
     marginal_deg: float = 6.0
     improvement: float = 0.05
     least_current_a: float = 5.0
@@ -43,3 +45,4 @@ class Thresholds:
     noise_share: float = 0.04
     worthwhile: float = 0.25
     lesser_evil: float = 1 / 3
+    useless_deg: float = 20.0

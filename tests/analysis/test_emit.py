@@ -49,7 +49,9 @@ def test_names_the_vehicle_never_reported_are_not_written(sweep):
     old = replace(
         sweep,
         parameters=ParameterHistory(
-            tuple(c for c in sweep.parameters.changes if "DIA" not in c.name)
+            tuple(
+                c for c in sweep.parameters.changes if "DIA" not in c.name and "ODI" not in c.name
+            )
         ),
     )
     names = analyse(old).compasses[0].parameters

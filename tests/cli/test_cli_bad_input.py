@@ -140,7 +140,7 @@ def test_a_log_cut_at_any_byte_of_its_last_two_frames_is_fitted(
         assert run(["fit", str(log), "--json", *SINGLE]) == 0, size
         captured = capsys.readouterr()
         assert captured.err == ""
-        assert json.loads(captured.out)["verdict"] == "good"
+        assert json.loads(captured.out)["verdict"] == "marginal"
 
 
 def test_two_vehicles_are_fitted_one_at_a_time(
@@ -153,13 +153,14 @@ def test_two_vehicles_are_fitted_one_at_a_time(
     assert "1, 7" in capsys.readouterr().err
 
 
-def test_a_log_without_parameters_gives_the_motor_vector_alone(
+def test_a_log_without_parameters_is_no_ground_to_write_anything(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     log = without(tmp_path / "bare.tlog", PARAMETERS)
-    assert run(["fit", str(log), "--json", *SINGLE]) == 0
+    assert run(["fit", str(log), "--json", *SINGLE]) == 1
     found = json.loads(capsys.readouterr().out)
-    assert all("_MOT" in name for name in found["compasses"][0]["parameters"])
+    assert found["compasses"][0]["parameters"] == {}
+    assert "COMPASS_OFS_X" in found["compasses"][0]["reasons"][0]
     assert any("no parameters" in note for note in found["notes"])
 
 

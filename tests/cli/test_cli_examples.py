@@ -22,7 +22,7 @@ def test_a_log_is_fitted_from_python() -> None:
         check=False,
     )
     assert (done.returncode, done.stderr) == (0, b"")
-    assert b"compass 3: good" in done.stdout
+    assert b"compass 3: marginal" in done.stdout
     assert b"COMPASS_MOTCT 2" in done.stdout
 
 
@@ -36,4 +36,4 @@ def test_many_logs_get_a_line_each(tmp_path: Path) -> None:
         env={**os.environ, "PATH": f"{tmp_path}:{os.environ['PATH']}"},
     )
     assert (done.returncode, done.stderr) == (0, b"")
-    assert done.stdout.decode().splitlines() == [f"{SWEEP} 1:good 2:good 3:good"] * 2
+    assert done.stdout.decode().splitlines() == [f"{SWEEP} 1:marginal 2:marginal 3:marginal"] * 2

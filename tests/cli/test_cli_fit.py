@@ -268,7 +268,7 @@ class TestText:
 
     def test_the_verdict_comes_first_in_words(self, capsys: pytest.CaptureFixture[str]) -> None:
         _, out, _ = answer(capsys, "fit", SWEEP)
-        verdict = out.index("GOOD")
+        verdict = out.index("MARGINAL")
         assert verdict < out.index("heading error") < out.index("COMPASS_MOTCT")
         assert "Nothing is written yet" in out
 

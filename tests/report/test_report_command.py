@@ -26,11 +26,11 @@ def test_a_report_is_written_in_the_form_of_its_suffix(tmp_path: Path, suffix: s
     assert run(["report", SWEEP, "-o", str(path)]) == 0
     text = path.read_text(encoding="utf-8")
     if suffix == ".json":
-        assert json.loads(text)["verdict"] == "good"
+        assert json.loads(text)["verdict"] == "marginal"
     elif suffix == ".md":
-        assert text.startswith("# Good:")
+        assert text.startswith("# Marginal:")
     else:
-        assert content_of(text).headings[0].startswith("Good:")
+        assert content_of(text).headings[0].startswith("Marginal:")
     assert [file.name for file in tmp_path.iterdir()] == [path.name]
 
 
@@ -109,7 +109,7 @@ def test_force_overwrites(tmp_path: Path) -> None:
     path = tmp_path / "report.md"
     path.write_text("old")
     assert run(["report", SWEEP, "-o", str(path), "--force"]) == 0
-    assert path.read_text(encoding="utf-8").startswith("# Good")
+    assert path.read_text(encoding="utf-8").startswith("# Marginal")
 
 
 def test_an_unusable_log_leaves_no_report(

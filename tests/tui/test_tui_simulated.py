@@ -37,7 +37,7 @@ async def test_the_whole_road(tmp_path):
             await until(pilot, lambda: app.live.armed is False)
             await tap(pilot, "n")
             await until(pilot, lambda: app.work.analysis is not None)
-            assert app.work.analysis.grade == "good"
+            assert app.work.analysis.grade == "marginal"
             await tap(pilot, "n")
             await tap(pilot, "w")
             await until(pilot, lambda: isinstance(app.screen, Confirm))
