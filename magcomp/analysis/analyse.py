@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from magcomp.align import controls, expected_earth, has_position, readings, reported
+from magcomp.align.health import compass_complaints, current_complaints
 from magcomp.analysis.emit import emit, emit_anyway
 from magcomp.autopilots import ardupilot
 from magcomp.earth import EarthField
@@ -195,7 +196,10 @@ def _one(
 ) -> _Judged:
     new = readings(recording, compass, start=wanted.start, end=wanted.end)
     problem = best_form([Problem(new, form, in_force, earth) for form in forms])
-    found, verdict = judge(problem, fit(problem, wanted.method))
+    complaints = compass_complaints(recording, compass)
+    if problem.control.kind == CURRENT:
+        complaints += current_complaints(recording)
+    found, verdict = judge(problem, fit(problem, wanted.method), complaints=complaints)
     return _Judged(problem, found, verdict)
 
 
@@ -264,8 +268,12 @@ def _choose(judged: Mapping[str, list[_Judged]]) -> str:
 
     if len(judged) == 1:
         return next(iter(judged))
-    if all(j.verdict.grade is Grade.REJECTED for j in judged[THROTTLE]):
-        return CURRENT
+    rejected = {
+        kind: all(j.verdict.grade is Grade.REJECTED for j in results)
+        for kind, results in judged.items()
+    }
+    if rejected[THROTTLE] or rejected[CURRENT]:
+        return CURRENT if rejected[THROTTLE] else THROTTLE
     return THROTTLE if unexplained(THROTTLE) < BETTER * unexplained(CURRENT) else CURRENT
 
 

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from magcomp.align import interpolate
 from magcomp.fit import Problem
 from magcomp.judge.evidence import cover, field_residual, used_lags
+from magcomp.judge.finding import Finding
 from magcomp.judge.heading_error import control_grid, heading_errors
 from magcomp.judge.thresholds import Thresholds
+from magcomp.judge.whole import on_constancy, on_earth
 from magcomp.model import (
     CORRECTION_SIZE,
     CURRENT,
@@ -34,19 +36,12 @@ sensor's scale that drifts with it, a lag that is not one number, wires that sha
 benchmarks/coverage.py counts how often the bounds hold on simulated vehicles."""
 
 
-@dataclass(frozen=True)
-class _Finding:
-    """One thing the judge noticed: how bad, and what to tell the pilot."""
-
-    grade: Grade
-    reason: str
-
-
 def judge(
     problem: Problem,
     fit: MotorFit,
     thresholds: Thresholds | None = None,
     rng: np.random.Generator | None = None,
+    complaints: tuple[str, ...] = (),
 ) -> tuple[MotorFit, Verdict]:
     """Judge a fit on data it did not see.
 
@@ -59,6 +54,8 @@ def judge(
     rng
         For the draws that turn covariance into degrees; fixed by default, so that the same log
         always gets the same answer.
+    complaints
+        What is wrong with the sensors, in words: any of them rejects.
 
     Returns
     -------
@@ -77,6 +74,9 @@ def judge(
     )
     covered = cover(samples, fit.correction.apply(samples.raw, samples.u))
     findings = [
+        *(Finding(Grade.REJECTED, complaint) for complaint in complaints),
+        *on_earth(problem, samples, fit),
+        *on_constancy(problem, fit, limits),
         *_on_unseen_parameters(problem.readings.in_force[-1].unseen),
         *_findings(fit, errors, residual, covered, limits),
     ]
@@ -128,17 +128,17 @@ def _findings(
     residual: FieldResidual,
     covered: Coverage,
     limits: Thresholds,
-) -> Iterator[_Finding]:
+) -> Iterator[Finding]:
     yield from _on_control(fit, covered, limits)
     yield from _on_unseen(fit, errors, residual, limits)
     yield from _on_bound(fit, errors, limits)
     yield from _on_shape(fit, residual, covered, limits)
 
 
-def _on_unseen_parameters(unseen: tuple[str, ...]) -> Iterator[_Finding]:
+def _on_unseen_parameters(unseen: tuple[str, ...]) -> Iterator[Finding]:
     if unseen:
         some = ", ".join(unseen[:3]) + (f" and {len(unseen) - 3} more" if len(unseen) > 3 else "")
-        yield _Finding(
+        yield Finding(
             Grade.REJECTED,
             f"what was in force is unknown, because {some} {'is' if len(unseen) == 1 else 'are'} "
             "not in the log: let the ground station fetch the whole parameter list while it "
@@ -146,16 +146,16 @@ def _on_unseen_parameters(unseen: tuple[str, ...]) -> Iterator[_Finding]:
         )
 
 
-def _on_control(fit: MotorFit, covered: Coverage, limits: Thresholds) -> Iterator[_Finding]:
+def _on_control(fit: MotorFit, covered: Coverage, limits: Thresholds) -> Iterator[Finding]:
     span = covered.u_high - covered.u_low
     if fit.regressor == CURRENT and span < limits.least_current_a:
-        yield _Finding(
+        yield Finding(
             Grade.REJECTED,
             f"the current only ranged from {covered.u_low:.0f} to {covered.u_high:.0f} A: "
             "fly climbs and descents so that the motors work harder and less hard",
         )
     elif fit.regressor != CURRENT and span < limits.least_throttle:
-        yield _Finding(
+        yield Finding(
             Grade.REJECTED,
             f"the throttle never rose above {covered.u_high * 100:.0f} %: fly a climb"
             if covered.u_high < 0.3
@@ -169,19 +169,19 @@ def _on_unseen(
     errors: tuple[HeadingError, ...],
     residual: FieldResidual,
     limits: Thresholds,
-) -> Iterator[_Finding]:
+) -> Iterator[Finding]:
     at_top = error_at(errors, fit.u_high)
     claims = at_top.before > at_top.p95
     fall = _fall(residual)
     if claims and fall < 0.0:
-        yield _Finding(
+        yield Finding(
             Grade.REJECTED,
             "on stretches it did not see, the new correction explains the field worse than the "
             f"one in force ({residual.held_out:.1f} instead of {residual.held_out_before:.1f} "
             "mGauss): something else than the motors disturbs this compass",
         )
     elif claims and fall < limits.improvement:
-        yield _Finding(
+        yield Finding(
             Grade.MARGINAL,
             f"on stretches it did not see, the unexplained field falls only from "
             f"{residual.held_out_before:.1f} to {residual.held_out:.1f} mGauss",
@@ -196,7 +196,7 @@ def _fall(residual: FieldResidual) -> float:
 
 def _on_bound(
     fit: MotorFit, errors: tuple[HeadingError, ...], limits: Thresholds
-) -> Iterator[_Finding]:
+) -> Iterator[Finding]:
     flown = [row for row in errors if row.u < fit.u_high]
     top = error_at(errors, fit.u_high)
     worst = max((*flown, top), key=lambda row: row.p95)
@@ -205,7 +205,7 @@ def _on_bound(
     tolerable = max(limits.marginal_deg, limits.lesser_evil * worst.before)
     tolerable = min(tolerable, limits.useless_deg)
     if fit.method == "sweep" and _of_motors(errors[0], top) <= tolerable:
-        yield _Finding(
+        yield Finding(
             Grade.MARGINAL,
             f"what the motors add is known, but the heading could still be wrong by "
             f"{worst.p95:.1f}° whatever they do: a vehicle that stands still cannot show whether "
@@ -213,7 +213,7 @@ def _on_bound(
         )
         return
     grade = Grade.MARGINAL if worst.p95 <= tolerable else Grade.REJECTED
-    yield _Finding(
+    yield Finding(
         grade,
         f"the heading could still be wrong by {worst.p95:.1f}° at {_quantity(fit, worst.u)}: "
         "record longer, turn all the way round and use the whole range of throttle",
@@ -227,16 +227,16 @@ def _of_motors(rest: HeadingError, top: HeadingError) -> float:
 
 def _on_shape(
     fit: MotorFit, residual: FieldResidual, covered: Coverage, limits: Thresholds
-) -> Iterator[_Finding]:
+) -> Iterator[Finding]:
     if fit.method == "flight" and covered.heading < limits.heading:
         enough = covered.heading >= limits.least_heading
-        yield _Finding(
+        yield Finding(
             Grade.MARGINAL if enough else Grade.REJECTED,
             f"the vehicle faced only {covered.heading * 100:.0f} % of a full turn: "
             "turn slowly all the way round",
         )
     if residual.held_out > limits.noise_share * fit.strength:
-        yield _Finding(
+        yield Finding(
             Grade.MARGINAL if _fall(residual) > limits.worthwhile else Grade.REJECTED,
             f"{residual.held_out:.0f} mGauss of {fit.strength:.0f} stay unexplained: look for "
             "iron, loose wiring or other currents near this compass",
@@ -246,7 +246,7 @@ def _on_shape(
         length = float(np.ptp(line.positions))
         noise = float(np.sqrt(np.mean([np.trace(lv.covariance) for lv in fit.levels])))
         if line.rms > limits.bends * length and line.rms > 2.0 * noise:
-            yield _Finding(
+            yield Finding(
                 Grade.MARGINAL,
                 f"the shift does not follow a straight line ({line.rms:.1f} mGauss off a line of "
                 f"{length:.0f}): the motors' wires may carry their currents unequally",

@@ -30,6 +30,8 @@ class Thresholds:
     lesser_evil
         A bound beyond ``marginal_deg`` is still marginal, not rejected, where it is below this
         share of the error in force.
+    departure_deg
+        Heading error beyond which a plain departure from the model keeps a fit from being good.
     useless_deg
         A bound beyond this is rejected whatever was in force.
     """
@@ -45,4 +47,5 @@ class Thresholds:
     noise_share: float = 0.04
     worthwhile: float = 0.25
     lesser_evil: float = 1 / 3
+    departure_deg: float = 1.0
     useless_deg: float = 20.0

@@ -1,0 +1,133 @@
+"""What is wrong with a sensor, told by its readings alone, before anything is fitted."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from magcomp.model import FloatArray, Recording, Series
+
+_FROZEN_S = 5.0
+_SILENT_S = 1.5
+_SILENT_SHARE = 0.08
+_WILD_SHARE = 0.02
+_WILD_MGAUSS = 120.0
+_WINDOW = 7
+_LEAST_READINGS = 30
+_STUCK_SHARE = 0.25
+
+
+def compass_complaints(recording: Recording, compass: int) -> tuple[str, ...]:
+    """In words for a pilot, why the readings of a compass cannot be trusted; empty where they can.
+
+    Parameters
+    ----------
+    recording
+        From any source.
+    compass
+        1, 2 or 3.
+    """
+    reported = recording.field.get(compass)
+    if reported is None or len(reported) < _LEAST_READINGS:
+        return ()
+    found = (_frozen(reported), _silent(reported, recording), _wild(reported))
+    return tuple(f"compass {compass} {complaint}" for complaint in found if complaint)
+
+
+def current_complaints(recording: Recording) -> tuple[str, ...]:
+    """The same for the battery monitor, as far as throttle and motor outputs contradict it."""
+    current = recording.current
+    if current is None or len(current) < _LEAST_READINGS:
+        return ()
+    working = _working(recording, current.time)
+    if working is None or np.ptp(working) <= 0.0:
+        return ()
+    top = float(np.quantile(current.value, 0.995))
+    if top <= 0.05 and float(np.quantile(working, 0.9)) > 0.2:
+        return (
+            "the battery monitor reads 0 A while the motors run: set it up, or fit by throttle",
+        )
+    found = []
+    start, end = _longest_run(current.value, current.time)
+    changed = working[(current.time >= start) & (current.time <= end)]
+    if end - start > _STUCK_SHARE * float(np.ptp(current.time)) and np.std(changed) > 0.02:
+        found.append(
+            f"the battery monitor is stuck at {np.interp(start, *_columns(current)):.0f} A from "
+            f"{start:.0f} to {end:.0f} s while the throttle changes"
+        )
+    at_top = current.value >= top - 1e-3 * max(abs(top), 1.0)
+    if not found and np.mean(at_top) > 0.1 and np.std(working[at_top]) > 0.02:
+        found.append(
+            f"the battery monitor saturates: it never reads above {top:.0f} A, however hard the "
+            "motors work"
+        )
+    return tuple(found)
+
+
+def _columns(series: Series) -> tuple[FloatArray, FloatArray]:
+    return series.time, series.value
+
+
+def _working(recording: Recording, time: FloatArray) -> FloatArray | None:
+    """How hard the motors work, 0 … 1, by the throttle."""
+    if recording.throttle is None or len(recording.throttle) < 2:
+        return None
+    return np.asarray(np.interp(time, recording.throttle.time, recording.throttle.value))
+
+
+def _longest_run(value: FloatArray, time: FloatArray) -> tuple[float, float]:
+    """When the longest run of one and the same value began and ended."""
+    changed = np.any(np.diff(value.reshape(len(value), -1), axis=0) != 0.0, axis=1)
+    starts = np.flatnonzero(np.r_[True, changed])
+    ends = np.r_[starts[1:] - 1, len(value) - 1]
+    longest = int(np.argmax(time[ends] - time[starts]))
+    return float(time[starts[longest]]), float(time[ends[longest]])
+
+
+def _frozen(reported: Series) -> str:
+    start, end = _longest_run(reported.value, reported.time)
+    changes = np.count_nonzero(np.any(np.diff(reported.value, axis=0) != 0.0, axis=1))
+    usual = float(np.ptp(reported.time)) / max(int(changes), 1)
+    if end - start < max(_FROZEN_S, 8 * usual):
+        return ""
+    return (
+        f"is frozen from {start:.0f} to {end:.0f} s: it repeats one reading; check its wiring, "
+        "and fly again"
+    )
+
+
+def _silent(reported: Series, recording: Recording) -> str:
+    """Whether it drops out while the rest of the vehicle goes on talking."""
+    if recording.attitude is None or len(recording.attitude) < 2:
+        return ""
+    step = np.diff(reported.time)
+    limit = max(_SILENT_S, 8 * float(np.median(step)))
+    heard = recording.attitude.time
+    usual_step = float(np.median(np.diff(heard)))
+    lost = 0.0
+    for index in np.flatnonzero(step > limit).tolist():
+        first, last = float(reported.time[index]), float(reported.time[index + 1])
+        inside = np.count_nonzero((heard > first) & (heard < last))
+        usual = (last - first) / usual_step
+        lost += last - first if inside > 0.6 * usual else 0.0
+    if lost < _SILENT_SHARE * float(np.ptp(reported.time)):
+        return ""
+    return (
+        f"drops out: it is missing or zero for {lost:.0f} s in all while the rest of the vehicle "
+        "goes on; check its wiring"
+    )
+
+
+def _wild(reported: Series) -> str:
+    """Readings whose strength is far from their neighbours': turning does not change it."""
+    new = np.r_[True, np.any(np.diff(reported.value, axis=0) != 0.0, axis=1)]
+    value = reported.value[new]
+    if len(value) < _LEAST_READINGS:
+        return ""
+    strength = np.linalg.norm(value, axis=1)
+    windows = np.lib.stride_tricks.sliding_window_view(strength, _WINDOW)
+    apart = np.abs(strength[_WINDOW // 2 : -(_WINDOW // 2)] - np.median(windows, axis=1))
+    usual = float(np.median(apart))
+    share = float(np.mean(apart > max(_WILD_MGAUSS, 10 * usual)))
+    if share < _WILD_SHARE:
+        return ""
+    return f"glitches: {share * 100:.0f} % of its readings jump away from their neighbours"

@@ -1,0 +1,213 @@
+"""Whether the model that was fitted holds: straight in the control quantity, the same throughout.
+
+A held-out proof cannot see what is alike in every part of a log, and a bound made of residuals
+knows nothing of what the model leaves out. Here each thing the model leaves out is put into it in
+turn, as a few more columns beside all the fitted ones, and what they take up is weighed against
+its own standard error (docs/method.md, The judge).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from magcomp.fit import Problem
+from magcomp.fit.flight import (
+    FIELD_LAG,
+    REGRESSOR_LAG,
+    SIN_DIP,
+    SIZE,
+    STRENGTH,
+    drift_blocks,
+    prior,
+    strength_and_dip,
+)
+from magcomp.fit.robust import time_blocks
+from magcomp.model import (
+    CORRECTION_SIZE,
+    MOTOR,
+    OFFSET,
+    FloatArray,
+    IntArray,
+    Lags,
+    MotorFit,
+    pack,
+)
+
+_SPLITS = (0.2, 0.35, 0.5, 0.65, 0.8)
+_LEAST_SIGMA = 3.5
+_BLOCK_S = 15.0
+_USUAL_DRIFT_MGAUSS = 3.0
+_MAD_TO_STD = 1.4826
+
+
+@dataclass(frozen=True)
+class Departure:
+    """One way in which the readings depart from the model.
+
+    Attributes
+    ----------
+    kind
+        ``"curve"``, ``"step"``, ``"motors"``, ``"place"`` or ``"wander"``.
+    degrees
+        Heading error it stands for, at the largest control quantity seen.
+    degrees_std
+        Its standard error.
+    mgauss
+        Size of the field it stands for.
+    at_s
+        When it happened, seconds since the recording began; NaN where it is not a moment.
+    gain
+        By how much it lowers the weighted sum of squares: which of two departures that look
+        alike it rather is.
+    """
+
+    kind: str
+    degrees: float
+    degrees_std: float
+    mgauss: float
+    at_s: float
+    gain: float
+
+    @property
+    def sigmas(self) -> float:
+        """Its size in standard errors."""
+        return self.degrees / max(self.degrees_std, 1e-9)
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether it is more than its own error explains."""
+        return self.sigmas > _LEAST_SIGMA
+
+
+@dataclass(frozen=True, eq=False)
+class _Linear:
+    """Residuals and slopes at the fit, weighted; what more columns are put beside."""
+
+    residuals: FloatArray
+    slopes: FloatArray
+    precision: FloatArray
+    blocks: IntArray
+
+    def taken_up(self, extra: FloatArray, width: float) -> tuple[FloatArray, FloatArray, float]:
+        """What ``extra`` columns (n, 2, m) take up, shape (m,), its covariance, and the gain.
+
+        ``width`` is what the columns may reasonably take, so that a direction the readings do not
+        show stays at zero instead of running away.
+        """
+        columns = np.concatenate([self.slopes, extra], axis=2)
+        size, more = columns.shape[2], extra.shape[2]
+        flat = columns.reshape(-1, size)
+        precision = np.concatenate([self.precision, np.full(more, 1.0 / width**2)])
+        bread = np.linalg.pinv(flat.T @ flat + np.diag(precision), hermitian=True)
+        found = -bread @ (flat.T @ self.residuals.reshape(-1))
+        left = self.residuals + columns @ found
+        scores = np.einsum("ngi,ng->ni", columns, left)
+        starts = np.flatnonzero(np.r_[True, np.diff(self.blocks) != 0])
+        summed = np.add.reduceat(scores, starts, axis=0)
+        count = len(summed)
+        meat = summed.T @ summed * (count / max(count - size, 1) if count > size else 1.0)
+        covariance = bread @ (meat + np.diag(precision)) @ bread
+        gain = float(np.sum(self.residuals**2) - np.sum(left**2))
+        return found[-more:], covariance[-more:, -more:], gain
+
+
+def departures_of(problem: Problem, fit: MotorFit, lags: Lags) -> tuple[Departure, ...]:
+    """Every way of departing from the model that can be weighed, plain or not.
+
+    Parameters
+    ----------
+    problem, fit
+        What was fitted, by the method of flights or of levels, and what came out.
+    lags
+        To look at the readings with.
+    """
+    samples = problem.sample(lags)
+    parameters = np.zeros(SIZE)
+    parameters[:CORRECTION_SIZE] = pack(fit.correction)
+    parameters[[STRENGTH, SIN_DIP]] = fit.strength, fit.vertical / fit.strength
+    parameters[[FIELD_LAG, REGRESSOR_LAG]] = lags.field, lags.regressor
+    values, slopes = strength_and_dip(samples, parameters)
+    linear = _weighted(problem, values, slopes)
+    horizontal = float(np.sqrt(max(fit.strength**2 - fit.vertical**2, 1.0)))
+    top = float(np.quantile(samples.u, 0.98))
+    if top <= 0.0:
+        return ()
+    weight = linear.slopes[:, :, OFFSET], linear.slopes[:, :, MOTOR] / top
+    share = np.clip(samples.u / top, 0.0, 2.0)[:, None, None]
+    wide = 0.3 * fit.strength
+    curved, covariance, gain = linear.taken_up(weight[1] * share, wide)
+    # The bow of q·s² over 0 … 1 departs from its best line by q/8.
+    found = [_departure("curve", curved / 8, covariance / 64, gain, horizontal, np.nan)]
+    steps = [samples.time > t for t in np.quantile(samples.time, _SPLITS)]
+    moments = np.quantile(samples.time, _SPLITS)
+    earth = linear.slopes[:, :, [STRENGTH, SIN_DIP]] * np.array([1.0, 1.0 / fit.strength])
+    for kind, columns in (("step", weight[0]), ("motors", weight[1]), ("place", earth)):
+        tried = [
+            _departure(kind, *linear.taken_up(columns * late[:, None, None], wide), horizontal, t)
+            for late, t in zip(steps, moments.tolist(), strict=True)
+        ]
+        found.append(max(tried, key=lambda d: d.gain))
+    found.append(_wander(linear, samples.time, weight[0], horizontal))
+    return tuple(found)
+
+
+def _weighted(problem: Problem, values: FloatArray, slopes: FloatArray) -> _Linear:
+    spread = np.maximum(_MAD_TO_STD * np.median(np.abs(values), axis=0), 0.2)
+    weight = 1.0 / np.sqrt(1.0 + (values / spread / 2.0) ** 2)
+    root = np.sqrt(weight) / spread
+    known = prior(problem, 4).precision
+    return _Linear(
+        residuals=values * root,
+        slopes=slopes * root[:, :, None],
+        precision=known,
+        blocks=drift_blocks(problem.readings.time),
+    )
+
+
+def _departure(
+    kind: str,
+    vector: FloatArray,
+    covariance: FloatArray,
+    gain: float,
+    horizontal: float,
+    at_s: float,
+) -> Departure:
+    """A body-fixed vector as heading error, with the error along its own direction."""
+    size = float(np.linalg.norm(vector))
+    unit = vector / size if size > 0.0 else np.ones(len(vector)) / np.sqrt(len(vector))
+    std = float(np.sqrt(max(unit @ covariance @ unit, 0.0)))
+    return Departure(
+        kind,
+        float(np.degrees(size / horizontal)),
+        float(np.degrees(std / horizontal)),
+        size,
+        at_s,
+        gain,
+    )
+
+
+def _wander(linear: _Linear, time: FloatArray, columns: FloatArray, horizontal: float) -> Departure:
+    """How much an offset of its own for each stretch of time takes up, beyond usual drift."""
+    block = time_blocks(time, _BLOCK_S)
+    sizes, errors = [], []
+    for number in np.unique(block):
+        rows = block == number
+        flat = columns[rows].reshape(-1, 3)
+        normal = flat.T @ flat + np.eye(3) / (3 * _USUAL_DRIFT_MGAUSS) ** 2
+        inverse = np.linalg.inv(normal)
+        vector = -inverse @ (flat.T @ linear.residuals[rows].reshape(-1))
+        sizes.append(float(vector @ vector))
+        errors.append(float(np.trace(inverse)) + 3 * _USUAL_DRIFT_MGAUSS**2)
+    excess = max(float(np.mean(sizes)) - float(np.mean(errors)), 0.0)
+    size = float(np.sqrt(excess))
+    std = float(np.mean(errors)) * np.sqrt(2.0 / (3 * len(sizes))) / (2 * size) if size else 0.0
+    return Departure(
+        "wander",
+        float(np.degrees(size / horizontal)),
+        float(np.degrees(std / horizontal)),
+        size,
+        float("nan"),
+        0.0,
+    )

@@ -1,0 +1,75 @@
+"""Findings on the recording as a whole: the earth it shows, and whether one model holds it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from magcomp.fit import Problem
+from magcomp.fit.flight import DIP_WIDTH
+from magcomp.judge.constancy import Departure, departures_of
+from magcomp.judge.evidence import used_lags
+from magcomp.judge.finding import Finding
+from magcomp.judge.thresholds import Thresholds
+from magcomp.model import Grade, MotorFit, Samples
+
+_WEAKEST_SHARE, _STRONGEST_SHARE = 0.35, 2.5
+"""Hard iron of any size a compass still works with keeps its median field between these shares."""
+
+_DIP_WIDTHS = 4.0
+
+
+def on_earth(problem: Problem, samples: Samples, fit: MotorFit) -> Iterator[Finding]:
+    """Whether strength and dip are the earth's."""
+    expected = problem.earth.strength
+    shown = float(np.median(np.linalg.norm(samples.present, axis=1)))
+    if not _WEAKEST_SHARE < shown / expected < _STRONGEST_SHARE:
+        yield Finding(
+            Grade.REJECTED,
+            f"the field has a strength of {shown:.0f} mGauss instead of {expected:.0f}: the "
+            "compass reports in another unit, or something magnetic is right beside it",
+        )
+    dip, model = np.arcsin(np.clip(fit.vertical / fit.strength, -1, 1)), problem.earth.dip
+    if fit.method != "sweep" and abs(np.sin(dip) - np.sin(model)) > _DIP_WIDTHS * DIP_WIDTH:
+        yield Finding(
+            Grade.REJECTED,
+            f"the field dips by {np.degrees(dip):.0f}° instead of the {np.degrees(model):.0f}° "
+            "that the world model gives for the log's position: the position is wrong, or the "
+            "compass is not mounted as its orientation says",
+        )
+
+
+def on_constancy(problem: Problem, fit: MotorFit, limits: Thresholds) -> Iterator[Finding]:
+    """Whether the shift is straight in the control quantity and alike throughout."""
+    if fit.method == "sweep":
+        return
+    found = [
+        departure
+        for departure in departures_of(problem, fit, used_lags(fit))
+        if departure.is_plain and departure.degrees > limits.departure_deg
+    ]
+    if found:
+        # A step of one thing looks like a step of others: what explains most is what it is.
+        likeliest = max(found, key=lambda d: d.gain)
+        yield Finding(
+            Grade.MARGINAL if likeliest.degrees < limits.marginal_deg else Grade.REJECTED,
+            _words(likeliest, problem.control.kind),
+        )
+
+
+def _words(departure: Departure, kind: str) -> str:
+    size = f"{departure.degrees:.0f}° ({departure.mgauss:.0f} mGauss)"
+    moment = f"{departure.at_s:.0f} s"
+    return {
+        "curve": f"the shift does not follow a straight line in the {kind}: it bends by {size}, "
+        "so one number an axis cannot cancel it",
+        "step": f"the compass itself changed by {size} near {moment}: a payload, a gimbal or loose "
+        "iron moved, or its calibration was changed unseen; fly with everything fixed",
+        "motors": f"what the motors add changed by {size} near {moment}: a wire moved, or another "
+        "load shares the battery",
+        "place": f"the local field changed by {departure.mgauss:.0f} mGauss near {moment}: fly "
+        "away from steel, buildings and the ground",
+        "wander": f"the compass's own offset keeps moving, by {size}: a gimbal, a servo or loose "
+        "iron near it, or a field that changes with place",
+    }[departure.kind]

@@ -1,0 +1,100 @@
+"""Sensors that fail are named from their readings alone; sound ones are left in peace."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import truth
+from synthetic import Flown
+
+from magcomp.align.health import compass_complaints, current_complaints
+from magcomp.model import Recording, Series
+from magcomp.sources import read
+
+FIXTURES = (
+    "flight",
+    "flight_low_rate",
+    "flight_uncalibrated",
+    "flight_wrong_mot",
+    "turntable_paper",
+    "turntable_five_levels",
+    "sweep_current",
+)
+
+
+@pytest.fixture(scope="module")
+def sound() -> Recording:
+    recording = Flown(seed=2, seconds=120.0).recording()
+    current = recording.current
+    assert current is not None
+    return replace(recording, throttle=Series(current.time, current.value / 60.0))
+
+
+def with_field(
+    recording: Recording, value: np.ndarray, keep: np.ndarray | None = None
+) -> Recording:
+    time = recording.field[1].time
+    rows = np.ones(len(time), bool) if keep is None else keep
+    return replace(recording, field={1: Series(time[rows], value[rows])})
+
+
+def with_current(recording: Recording, change) -> Recording:
+    current = recording.current
+    return replace(recording, current=Series(current.time, change(current.time, current.value)))
+
+
+def test_a_sound_vehicle_gives_no_complaint(sound):
+    assert compass_complaints(sound, 1) == ()
+    assert current_complaints(sound) == ()
+
+
+@pytest.mark.parametrize("name", FIXTURES)
+def test_recordings_of_the_real_firmware_give_no_complaint(name):
+    recording = read(truth.FIXTURES / f"{name}.tlog")
+    assert [compass_complaints(recording, n) for n in recording.field] == [()] * 3
+    assert current_complaints(recording) == ()
+
+
+def test_a_frozen_compass_is_named_with_its_time(sound):
+    field = sound.field[1]
+    value = np.where((field.time > 60.0)[:, None], field.value[600], field.value)
+    (complaint,) = compass_complaints(with_field(sound, value), 1)
+    assert "frozen from 6" in complaint
+
+
+def test_a_compass_that_drops_out_is_named(sound):
+    field = sound.field[1]
+    keep = field.time % 15.0 > 4.0
+    (complaint,) = compass_complaints(with_field(sound, field.value, keep), 1)
+    assert "drops out" in complaint
+
+
+def test_a_gap_of_the_whole_link_is_not_the_compass(sound):
+    field, attitude = sound.field[1], sound.attitude
+    heard = attitude.time % 15.0 > 4.0
+    gappy = replace(sound, attitude=Series(attitude.time[heard], attitude.value[heard]))
+    assert compass_complaints(with_field(gappy, field.value, field.time % 15.0 > 4.0), 1) == ()
+
+
+def test_a_compass_that_glitches_is_named(sound):
+    rng = np.random.default_rng(1)
+    value = sound.field[1].value.copy()
+    value[rng.random(len(value)) < 0.08] *= 3.0
+    (complaint,) = compass_complaints(with_field(sound, value), 1)
+    assert "glitches" in complaint
+
+
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        (lambda time, value: 0.0 * value, "reads 0 A"),
+        (lambda time, value: np.where(time > 40.0, 25.0, value), "stuck"),
+        (lambda time, value: np.minimum(value, np.quantile(value, 0.6)), "saturates"),
+    ],
+    ids=["dead", "stuck", "saturated"],
+)
+def test_a_battery_monitor_that_fails_is_named(sound, change, word):
+    (complaint,) = current_complaints(with_current(sound, change))
+    assert word in complaint

@@ -1,0 +1,86 @@
+"""One model for the whole recording: what bends, steps or moves is found and named."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from synthetic import EXACT, Flown, problem_of
+
+from magcomp.fit import fit
+from magcomp.judge.constancy import Departure, departures_of
+from magcomp.judge.judge import judge
+from magcomp.model import Grade, Recording, Series
+
+FLOWN = Flown(seed=3, seconds=240.0, tilt=0.25)
+HALF_S = 120.0
+
+
+def changed(recording: Recording, added: np.ndarray) -> Recording:
+    field = recording.field[1]
+    return replace(recording, field={1: Series(field.time, field.value + added)})
+
+
+def found(recording: Recording) -> dict[str, Departure]:
+    problem = problem_of(recording)
+    fitted = fit(problem, "flight")
+    return {d.kind: d for d in departures_of(problem, fitted, fitted.lags)}
+
+
+def amperes(recording: Recording) -> np.ndarray:
+    measured = recording.field[1].time - FLOWN.current_lag
+    return np.interp(measured, recording.current.time, recording.current.value)
+
+
+@pytest.fixture(scope="module")
+def sound() -> Recording:
+    return FLOWN.recording()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_sound_flight_departs_nowhere(seed):
+    departures = found(replace(FLOWN, seed=seed).recording())
+    assert {kind for kind, d in departures.items() if d.is_plain and d.degrees > 1.0} == set()
+
+
+def test_a_payload_that_comes_half_way_is_a_step_of_its_size(sound):
+    late = sound.field[1].time > HALF_S
+    magnet = np.array([12.0, -9.0, 5.0])
+    step = found(changed(sound, np.multiply.outer(late, EXACT.soft_iron @ magnet)))["step"]
+    assert step.is_plain
+    assert step.mgauss == pytest.approx(np.linalg.norm(magnet), rel=0.15)
+    assert step.at_s == pytest.approx(HALF_S, abs=12.0)
+
+
+def test_a_wire_that_moves_changes_what_the_motors_add(sound):
+    late = sound.field[1].time > HALF_S
+    half = -0.5 * np.multiply.outer(late * amperes(sound), -EXACT.motor)
+    departure = found(changed(sound, half))["motors"]
+    assert departure.is_plain
+    assert departure.degrees > 5.0
+
+
+def test_interference_that_grows_with_the_square_is_a_curve(sound):
+    u = amperes(sound)
+    top = np.quantile(u, 0.98)
+    bend = np.array([30.0, 0.0, 0.0])
+    curve = found(changed(sound, np.multiply.outer((u / top) ** 2, bend)))["curve"]
+    assert curve.is_plain
+    # A parabola of 30 mGauss over 0 … 1 departs from its best line by an eighth.
+    assert curve.mgauss == pytest.approx(30.0 / 8, rel=0.3)
+
+
+def test_a_step_keeps_a_fit_from_being_good_and_is_named(sound):
+    late = sound.field[1].time > HALF_S
+    problem = problem_of(changed(sound, np.multiply.outer(late, [15.0, 10.0, 0.0])))
+    verdict = judge(problem, fit(problem, "flight"))[1]
+    assert verdict.grade is not Grade.GOOD
+    assert "payload" in verdict.reasons[0]
+
+
+def test_a_complaint_about_a_sensor_rejects(sound):
+    problem = problem_of(sound)
+    verdict = judge(problem, fit(problem, "flight"), complaints=("compass 1 is frozen",))[1]
+    assert verdict.grade is Grade.REJECTED
+    assert verdict.reasons[0] == "compass 1 is frozen"
