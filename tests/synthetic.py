@@ -26,6 +26,7 @@ from magcomp.model import (
     Recording,
     Series,
     Vehicle,
+    compasses_of,
 )
 
 FloatArray = NDArray[np.float64]
@@ -146,7 +147,7 @@ class Flown:
             fields[compass] = Series(time, reported_field)
         return Recording(
             source="synthetic",
-            vehicle=Vehicle("ardupilot", "copter", 1, 1, "4.6.3", (97539,)),
+            vehicle=Vehicle("ardupilot", "copter", 1, 1, "4.6.3", compasses_of((97539,))),
             start_unix_s=UNIX_S,
             duration_s=self.seconds,
             field=fields,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from magcomp.autopilots import ardupilot
+from magcomp import autopilots
 from magcomp.errors import MissingDataError
 from magcomp.model import (
     BoolArray,
@@ -61,7 +61,10 @@ def readings(
         )
     keep = _is_new(reported.value)
     keep &= (reported.time >= start) & (reported.time <= end)
-    keep &= _away_from(reported.time, ardupilot.calibration_changes(recording.parameters))
+    autopilot = autopilots.of(recording)
+    applied = recording.applied.get(compass)
+    changes = autopilot.changes(recording.parameters, told_per_reading=applied is not None)
+    keep &= _away_from(reported.time, changes)
     keep &= ~_in_gap(reported.time, recording.attitude.time)
     keep &= _usable_state(reported.time, recording.armed)
     if not keep.any():
@@ -70,11 +73,13 @@ def readings(
             f"asked for; instead all {len(reported)} were repeats, gaps or outside it"
         )
     time = reported.time[keep]
-    in_force, stretch = _corrections(recording, compass, time)
+    in_force, stretch = _corrections(recording, compass, time, changes)
+    meaning = autopilot.field_meaning(recording.format)
+    value = reported.value[keep]
     return Readings(
         compass=compass,
         time=time,
-        reported=_mend_truncation(reported.value[keep]),
+        reported=_mend_truncation(value) if meaning.truncated else value,
         stretch=stretch,
         in_force=in_force,
         attitude=Series(recording.attitude.time, np.unwrap(recording.attitude.value, axis=0)),
@@ -139,23 +144,31 @@ def _mend_truncation(value: FloatArray) -> FloatArray:
 
 
 def _corrections(
-    recording: Recording, compass: int, time: FloatArray
+    recording: Recording, compass: int, time: FloatArray, changes: tuple[float, ...]
 ) -> tuple[tuple[InForce, ...], IntArray]:
     """Corrections in force, oldest first, the last one being that of the end; which at each time.
 
     Only those of the times are worked out: a log may hold many changes between two readings.
     """
-    moments = np.array([-np.inf, *ardupilot.calibration_changes(recording.parameters)])
+    autopilot = autopilots.of(recording)
+    moments = np.array([-np.inf, *changes])
     last = len(moments) - 1
     period = np.searchsorted(moments, time, side="right") - 1
     periods, stretch = np.unique(np.append(period, last), return_inverse=True)
     in_force: list[InForce] = []
     number = np.empty(len(periods), dtype=np.intp)
-    previous: ardupilot.Calibration | None = None
     for index, moment in enumerate(moments[periods].tolist()):
-        calibration = ardupilot.calibration_at(recording.parameters, compass, moment)
-        if previous is None or not calibration.same_as(previous):
-            in_force.append(ardupilot.in_force(calibration))
-        previous = calibration
+        now = autopilot.in_force_at(recording.parameters, compass, moment)
+        if not in_force or not _corrects_alike(now, in_force[-1]):
+            in_force.append(now)
         number[index] = len(in_force) - 1
     return tuple(in_force), number[stretch[:-1]]
+
+
+def _corrects_alike(one: InForce, other: InForce) -> bool:
+    return (
+        one.regressor == other.regressor
+        and np.array_equal(one.correction.offset, other.correction.offset)
+        and np.array_equal(one.correction.soft_iron, other.correction.soft_iron)
+        and np.array_equal(one.correction.motor, other.correction.motor)
+    )

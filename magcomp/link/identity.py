@@ -6,12 +6,12 @@ import re
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from magcomp import autopilots
 from magcomp.link.framing import Message
 from magcomp.mavlink.header import payload
 from magcomp.mavlink.heartbeat import Identity, identify
 from magcomp.mavlink.parameters import decode_param_value, encoding
 from magcomp.model import Vehicle
-from magcomp.sources.quantities import DEVICE_ID_NAMES
 
 _BANNER = re.compile(r"\bV(\d+\.\d+\.\d+)")
 _RETRY_S = 0.4
@@ -45,17 +45,18 @@ class Identification:
     @property
     def vehicle(self) -> Vehicle:
         """Everything known so far."""
-        names = DEVICE_ID_NAMES[self._heartbeat.autopilot]
         how = encoding(self._heartbeat.autopilot, self._capabilities)
-        sent = (self._device_ids[name] for name in names if name in self._device_ids)
-        ids = (_whole(decode_param_value(each, how).value) for each in sent)
+        values = {
+            name: _whole(decode_param_value(sent, how).value)
+            for name, sent in self._device_ids.items()
+        }
         return Vehicle(
             autopilot=self._heartbeat.autopilot,
             kind=self._heartbeat.kind,
             system=self._heartbeat.system,
             component=self._heartbeat.component,
             firmware=self._firmware,
-            device_ids=tuple(number for number in ids if number),
+            compasses=autopilots.named(self._heartbeat.autopilot).compasses(values),
             board=self._board,
             capabilities=self._capabilities,
         )
@@ -104,7 +105,7 @@ class Identification:
         return questions
 
     def _known_names(self) -> tuple[str, ...]:
-        return DEVICE_ID_NAMES[self._heartbeat.autopilot]
+        return autopilots.named(self._heartbeat.autopilot).device_id_names
 
     def _missing_ids(self) -> list[str]:
         return [name for name in self._known_names() if name not in self._device_ids]

@@ -37,6 +37,11 @@ class Correction:
         """Corrected field, mGauss, shape (n, 3); PAPER.md equation 6 with a moving centre."""
         return (raw + self.offset) @ self.soft_iron.T + np.multiply.outer(u, self.motor)
 
+    def undo(self, corrected: FloatArray, u: FloatArray) -> FloatArray:
+        """Sensor field, mGauss, shape (n, 3): the inverse of :meth:`apply`."""
+        linear = corrected - np.multiply.outer(u, self.motor)
+        return np.asarray(np.linalg.solve(self.soft_iron, linear.T).T - self.offset)
+
     def centre(self, u: float) -> FloatArray:
         """Centre of the raw ellipsoid at control quantity ``u``, mGauss, shape (3,)."""
         return -self.offset - np.linalg.solve(self.soft_iron, self.motor) * u
@@ -87,10 +92,17 @@ class InForce:
         Hard and soft iron and motor correction.
     regressor
         The control quantity ``correction.motor`` was multiplied by; None where it was off.
+    calibrated
+        Whether the offsets were ever found: of a vehicle that was never calibrated they are 0.
+    unseen
+        Parameters that act on the readings and of which the recording does not tell the value;
+        the firmware's defaults stand for them.
     """
 
     correction: Correction
     regressor: str | None
+    calibrated: bool = True
+    unseen: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from magcomp import autopilots
 from magcomp.errors import LogError
 from magcomp.mavlink.checksum import ByteArray, OffsetArray
 from magcomp.mavlink.frames import Frames, Scan, scan
@@ -172,7 +173,7 @@ def _recording(decoded: Decoded, source: str, kind: str) -> Recording:
             system=who.system,
             component=who.component,
             firmware=quantities.firmware(messages),
-            device_ids=quantities.device_ids(parameters, who.autopilot),
+            compasses=autopilots.named(who.autopilot).compasses(parameters.latest),
             capabilities=quantities.capabilities(messages),
         ),
         start_unix_s=decoded.start_unix_s,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from magcomp.mavlink.heartbeat import is_armed
 from magcomp.mavlink.messages import Message, Table, text
 from magcomp.mavlink.parameters import decode_values, encoding
-from magcomp.model import FloatArray, ParameterChange, ParameterHistory, Series
+from magcomp.model import FloatArray, ParameterChange, Series
 
 STANDARD_GRAVITY = 9.80665
 OUTPUTS = 16
@@ -162,7 +162,7 @@ def parameters(messages: Messages, autopilot: str, simulation: bool) -> list[Par
     messages
         One vehicle's messages.
     autopilot
-        ``"ardupilot"`` or ``"px4"``.
+        As in ``Vehicle.autopilot``.
     simulation
         True for the SIM_* parameters alone, False for all others.
     """
@@ -199,19 +199,6 @@ def firmware(messages: Messages) -> str:
             if banner:
                 return banner.group(1)
     return ""
-
-
-DEVICE_ID_NAMES = {
-    "ardupilot": ("COMPASS_DEV_ID", "COMPASS_DEV_ID2", "COMPASS_DEV_ID3"),
-    "px4": ("CAL_MAG0_ID", "CAL_MAG1_ID", "CAL_MAG2_ID"),
-}
-"""Parameters that tell which compasses a vehicle has, by autopilot."""
-
-
-def device_ids(parameters: ParameterHistory, autopilot: str) -> tuple[int, ...]:
-    """The compasses' device ids as last reported, without those that are 0."""
-    values = (parameters.last(name, 0.0) for name in DEVICE_ID_NAMES[autopilot])
-    return tuple(int(value) for value in values if np.isfinite(value) and value)
 
 
 def unix_offset(messages: Messages) -> float:
