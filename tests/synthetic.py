@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from magcomp.align import controls, readings, reported
-from magcomp.align.sample import APPLIED_LATER_S
 from magcomp.autopilots import ardupilot
 from magcomp.earth import EarthField, expected_field
 from magcomp.fit import Problem
@@ -28,6 +27,9 @@ from magcomp.model import (
     Vehicle,
     compasses_of,
 )
+
+# ArduCopter corrects a reading, the mean over 0.1 s, with the battery read 0.1 s ago.
+APPLIED_LATER_S = 0.05
 
 FloatArray = NDArray[np.float64]
 

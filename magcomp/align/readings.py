@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from magcomp import autopilots
+from magcomp.autopilots import Autopilot, Kind
 from magcomp.errors import MissingDataError
 from magcomp.model import (
+    Applied,
     BoolArray,
     FloatArray,
     InForce,
@@ -63,8 +67,10 @@ def readings(
     keep &= (reported.time >= start) & (reported.time <= end)
     autopilot = autopilots.of(recording)
     applied = recording.applied.get(compass)
+    corrected = compass not in recording.raw_compasses
     changes = autopilot.changes(recording.parameters, told_per_reading=applied is not None)
-    keep &= _away_from(reported.time, changes)
+    if corrected:
+        keep &= _away_from(reported.time, changes)
     keep &= ~_in_gap(reported.time, recording.attitude.time)
     keep &= _usable_state(reported.time, recording.armed)
     if not keep.any():
@@ -74,6 +80,10 @@ def readings(
         )
     time = reported.time[keep]
     in_force, stretch = _corrections(recording, compass, time, changes)
+    told_offset = told_motor = None
+    if applied is not None:
+        told_offset, told_motor = applied.offset.value[keep], applied.motor.value[keep]
+        in_force = (*in_force[:-1], _told(in_force[-1], applied, autopilot))
     meaning = autopilot.field_meaning(recording.format)
     value = reported.value[keep]
     return Readings(
@@ -83,6 +93,10 @@ def readings(
         stretch=stretch,
         in_force=in_force,
         attitude=Series(recording.attitude.time, np.unwrap(recording.attitude.value, axis=0)),
+        corrected=corrected,
+        applied_later=meaning.applied_later_s,
+        told_offset=told_offset,
+        told_motor=told_motor,
     )
 
 
@@ -163,6 +177,27 @@ def _corrections(
             in_force.append(now)
         number[index] = len(in_force) - 1
     return tuple(in_force), number[stretch[:-1]]
+
+
+def _told(in_force: InForce, applied: Applied, autopilot: Autopilot) -> InForce:
+    """The present correction, with what the log tells in the place of parameters it does not.
+
+    An offset that the log tells is the one in force, whatever was reported: a vehicle that learns
+    reports its offsets late or never. A motor correction of 0 throughout says that there was none.
+    """
+    offset = applied.offset.value[-1]
+    idle = not applied.motor.value.any()
+    told = {Kind.OFFSET, Kind.MOTOR, Kind.SWITCH} if idle else {Kind.OFFSET}
+    return replace(
+        in_force,
+        correction=replace(in_force.correction, offset=offset),
+        calibrated=autopilot.is_calibrated(offset),
+        unseen=tuple(
+            name
+            for name in in_force.unseen
+            if (found := autopilots.parse(name)) is None or found.kind not in told
+        ),
+    )
 
 
 def _corrects_alike(one: InForce, other: InForce) -> bool:

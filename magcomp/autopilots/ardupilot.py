@@ -18,6 +18,7 @@ from magcomp.autopilots.ardupilot_correction import (
     correct,
     correction_parameters,
     in_force,
+    is_calibrated,
     scale_in_force,
     soft_iron_matrix,
     soft_iron_parameters,
@@ -162,6 +163,10 @@ class ArduPilot:
     def in_force_at(self, parameters: ParameterHistory, compass: int, time: float) -> InForce:
         """Every parameter acts from its report, armed or not."""
         return in_force(calibration_at(parameters, compass, time), unseen(parameters, compass))
+
+    def is_calibrated(self, offset: FloatArray) -> bool:
+        """Offsets of almost no length were never found."""
+        return is_calibrated(offset)
 
     def regressor(self, values: Mapping[str, float]) -> str | None:
         """COMPASS_MOTCT serves all compasses."""

@@ -133,9 +133,14 @@ def in_force(calibration: Calibration, unseen: tuple[str, ...] = ()) -> InForce:
             motor=calibration.motor,
         ),
         regressor=_REGRESSOR_OF.get(calibration.compensation),
-        calibrated=bool(np.linalg.norm(calibration.offset) >= NEVER_CALIBRATED),
+        calibrated=is_calibrated(calibration.offset),
         unseen=unseen,
     )
+
+
+def is_calibrated(offset: FloatArray) -> bool:
+    """Whether offsets, mGauss, shape (3,), were ever found."""
+    return bool(np.linalg.norm(offset) >= NEVER_CALIBRATED)
 
 
 def correction_parameters(correction: Correction, compass: int, scale: float) -> dict[str, float]:

@@ -257,6 +257,16 @@ class Autopilot(Protocol):
         """
         ...
 
+    def is_calibrated(self, offset: FloatArray) -> bool:
+        """Whether offsets were ever found: of a vehicle that was never calibrated they are 0.
+
+        Parameters
+        ----------
+        offset
+            In force, mGauss, shape (3,).
+        """
+        ...
+
     def regressor(self, values: Mapping[str, float]) -> str | None:
         """The control quantity the motor correction is multiplied by; None where it is off."""
         ...

@@ -21,6 +21,7 @@ from magcomp.model import (
     THROTTLE,
     Compass,
     Correction,
+    FloatArray,
     InForce,
     ParameterHistory,
     Recording,
@@ -136,6 +137,10 @@ class Px4:
     ) -> InForce:
         """Not known."""
         return self._refuse()
+
+    def is_calibrated(self, offset: FloatArray) -> bool:
+        """Offsets of exactly 0 were never found."""
+        return bool(offset.any())
 
     def regressor(self, values: Mapping[str, float]) -> str | None:
         """By thrust or by the current of the first battery; no other is a quantity here."""

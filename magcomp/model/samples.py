@@ -123,6 +123,14 @@ class Readings:
         What was in force, oldest first; the last is the present one.
     attitude
         Roll, pitch and yaw, radians, each unwrapped.
+    corrected
+        Whether what was in force is in ``reported``; False where the sensor's own field is.
+    applied_later
+        What is in force was multiplied by a control quantity this much older than what disturbed
+        the reading, seconds.
+    told_offset, told_motor
+        The offset and the motor correction of each reading as the log tells them, mGauss, shape
+        (n, 3); None where only the parameters tell. They stand for those of ``in_force``.
     """
 
     compass: int
@@ -131,6 +139,10 @@ class Readings:
     stretch: IntArray
     in_force: tuple[InForce, ...]
     attitude: Series
+    corrected: bool = True
+    applied_later: float = 0.05
+    told_offset: FloatArray | None = None
+    told_motor: FloatArray | None = None
 
     def __len__(self) -> int:
         return len(self.time)
@@ -138,7 +150,12 @@ class Readings:
     def where(self, keep: BoolArray) -> Readings:
         """The rows for which ``keep`` is true."""
         return replace(
-            self, time=self.time[keep], reported=self.reported[keep], stretch=self.stretch[keep]
+            self,
+            time=self.time[keep],
+            reported=self.reported[keep],
+            stretch=self.stretch[keep],
+            told_offset=None if self.told_offset is None else self.told_offset[keep],
+            told_motor=None if self.told_motor is None else self.told_motor[keep],
         )
 
 

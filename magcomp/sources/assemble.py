@@ -163,7 +163,7 @@ def decode_vehicle(
 def _recording(decoded: Decoded, source: str, kind: str) -> Recording:
     messages, who = decoded.messages, decoded.who
     changes = quantities.parameters(messages, who.autopilot, simulation=False)
-    parameters = ParameterHistory(tuple(changes))
+    parameters = ParameterHistory(tuple(changes), quantities.holds_whole_list(messages))
     heartbeats = messages[Message.HEARTBEAT]
     return Recording(
         source=source,
@@ -175,6 +175,7 @@ def _recording(decoded: Decoded, source: str, kind: str) -> Recording:
             firmware=quantities.firmware(messages),
             compasses=autopilots.named(who.autopilot).compasses(parameters.latest),
             capabilities=quantities.capabilities(messages),
+            uid=quantities.uid(messages),
         ),
         start_unix_s=decoded.start_unix_s,
         duration_s=decoded.duration_s,

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from magcomp.mavlink.heartbeat import is_armed
 from magcomp.mavlink.messages import Message, Table, text
 from magcomp.mavlink.parameters import decode_values, encoding
+from magcomp.mavlink.version import firmware_version, unique_id
 from magcomp.model import FloatArray, ParameterChange, Series
 
 STANDARD_GRAVITY = 9.80665
@@ -180,6 +181,19 @@ def parameters(messages: Messages, autopilot: str, simulation: bool) -> list[Par
     ]
 
 
+def holds_whole_list(messages: Messages) -> bool:
+    """Whether every place of the vehicle's parameter list was reported."""
+    if Message.PARAM_VALUE not in messages:
+        return False
+    table = messages[Message.PARAM_VALUE].table
+    listed = table[table["param_index"] < table["param_count"]]
+    if not len(listed):
+        return False
+    count = listed["param_count"][-1]
+    places = np.unique(listed["param_index"][listed["param_count"] == count])
+    return len(places) == int(count)
+
+
 def capabilities(messages: Messages) -> int:
     """AUTOPILOT_VERSION.capabilities as last reported; 0 where it was not."""
     if Message.AUTOPILOT_VERSION not in messages:
@@ -187,12 +201,20 @@ def capabilities(messages: Messages) -> int:
     return int(messages[Message.AUTOPILOT_VERSION].table["capabilities"][-1])
 
 
+def uid(messages: Messages) -> str:
+    """The flight controller's own number in hexadecimal; empty where it was not reported."""
+    if Message.AUTOPILOT_VERSION not in messages:
+        return ""
+    row = messages[Message.AUTOPILOT_VERSION].table[-1]
+    return unique_id(row["uid2"].tobytes(), int(row["uid"]))
+
+
 def firmware(messages: Messages) -> str:
     """Version such as "4.6.3" as last reported; empty where it was not."""
     if Message.AUTOPILOT_VERSION in messages:
-        version = int(messages[Message.AUTOPILOT_VERSION].table["flight_sw_version"][-1])
-        if version:
-            return f"{version >> 24}.{version >> 16 & 0xFF}.{version >> 8 & 0xFF}"
+        packed = messages[Message.AUTOPILOT_VERSION].table["flight_sw_version"][-1]
+        if version := firmware_version(int(packed)):
+            return version
     if Message.STATUSTEXT in messages:
         for line in reversed(text(messages[Message.STATUSTEXT].table["text"])):
             banner = _BANNER.match(line)

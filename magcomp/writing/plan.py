@@ -209,7 +209,7 @@ def _check_identity(wanted: ParameterSet, actual: Vehicle, *, any_vehicle: bool)
         )
     else:
         same = _stand_alike(compasses, actual.compasses) and (
-            owner is None or (owner.autopilot, owner.system) == (actual.autopilot, actual.system)
+            owner is None or _may_be_one(owner, actual)
         )
         if same and compasses:
             return ()
@@ -222,6 +222,12 @@ def _check_identity(wanted: ParameterSet, actual: Vehicle, *, any_vehicle: bool)
     return (f"Another vehicle is written on request: {complaint}.",)
 
 
+def _may_be_one(owner: Vehicle, actual: Vehicle) -> bool:
+    twins = owner.uid and actual.uid and owner.uid != actual.uid
+    same = (owner.autopilot, owner.system) == (actual.autopilot, actual.system)
+    return same and not twins
+
+
 def _stand_alike(wanted: Iterable[Compass], actual: Iterable[Compass]) -> bool:
     """Whether each slot that is known holds the same sensor: parameters belong to slots."""
     held = {compass.slot: compass.device_id for compass in actual}
@@ -231,6 +237,7 @@ def _stand_alike(wanted: Iterable[Compass], actual: Iterable[Compass]) -> bool:
 def _described(vehicle: Vehicle) -> str:
     return (
         f"{vehicle.autopilot} system {vehicle.system} with compasses {_listed(vehicle.compasses)}"
+        + (f" and flight controller {vehicle.uid}" if vehicle.uid else "")
     )
 
 
