@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from magcomp.align import controls, readings, reported
-from magcomp.align.sample import APPLIED_LATER_S
 from magcomp.autopilots import ardupilot
 from magcomp.earth import EarthField, expected_field
 from magcomp.fit import Problem
@@ -26,7 +25,11 @@ from magcomp.model import (
     Recording,
     Series,
     Vehicle,
+    compasses_of,
 )
+
+# ArduCopter corrects a reading, the mean over 0.1 s, with the battery read 0.1 s ago.
+APPLIED_LATER_S = 0.05
 
 FloatArray = NDArray[np.float64]
 
@@ -146,7 +149,7 @@ class Flown:
             fields[compass] = Series(time, reported_field)
         return Recording(
             source="synthetic",
-            vehicle=Vehicle("ardupilot", "copter", 1, 1, "4.6.3", (97539,)),
+            vehicle=Vehicle("ardupilot", "copter", 1, 1, "4.6.3", compasses_of((97539,))),
             start_unix_s=UNIX_S,
             duration_s=self.seconds,
             field=fields,

@@ -12,19 +12,18 @@ from __future__ import annotations
 
 import numpy as np
 
+from magcomp import autopilots
 from magcomp.align.sample import interpolate
+from magcomp.autopilots.protocol import MotorOutputs
 from magcomp.model import (
     CURRENT,
     THROTTLE,
     Control,
     FloatArray,
-    ParameterHistory,
     Recording,
     Series,
 )
 
-_MOTOR_FUNCTIONS = frozenset([*range(33, 41), *range(82, 86)])
-_DEFAULT_MOTORS = 4
 _SHIFTS = np.arange(-0.2, 0.301, 0.02)
 _TREND_S = 5.0
 _LEAST_ROWS = 30
@@ -41,7 +40,8 @@ def controls(recording: Recording) -> tuple[Control, ...]:
         are the same quantity, differently sampled; the fit decides which explains the field.
     """
     found: list[Control] = []
-    duty = _duty(recording)
+    motors = _motors(recording)
+    duty = _duty(recording.outputs, motors)
     if recording.current is not None and _varies(recording.current):
         found.append(Control(CURRENT, recording.current, "battery current"))
         if duty is not None:
@@ -50,7 +50,7 @@ def controls(recording: Recording) -> tuple[Control, ...]:
         throttle = Series(recording.throttle.time, _mend_percent(recording.throttle.value))
         found.append(Control(THROTTLE, throttle, "reported throttle"))
         if duty is not None:
-            thrust = _thrust(duty, recording)
+            thrust = _thrust(duty, motors)
             exact = thrust is not None and _explains(thrust, recording.throttle)
             if thrust is not None and exact:
                 found.append(
@@ -79,52 +79,30 @@ def _mend_percent(value: FloatArray) -> FloatArray:
     return np.where((value > 0.0) & whole & (value < 1.0), value + 0.005, value)
 
 
-def _motor_channels(parameters: ParameterHistory, outputs: Series) -> list[int]:
-    """Indices of the outputs that drive motors: SERVOn_FUNCTION, else the first four."""
-    by_function = [
-        index
-        for index in range(outputs.value.shape[1])
-        if parameters.last(f"SERVO{index + 1}_FUNCTION", 0.0) in _MOTOR_FUNCTIONS
-    ]
-    channels = by_function or list(range(_DEFAULT_MOTORS))
-    return [c for c in channels if c < outputs.value.shape[1] and outputs.value[:, c].any()]
-
-
-def _duty(recording: Recording) -> Series | None:
-    """Duty 0 … 1 of each motor, shape (n, motors), from its limits MOT_PWM_MIN and _MAX."""
-    outputs = recording.outputs
-    if outputs is None or len(outputs) < _LEAST_ROWS:
+def _duty(outputs: Series | None, motors: MotorOutputs | None) -> Series | None:
+    """Duty 0 … 1 of each motor that is driven, shape (n, motors)."""
+    if outputs is None or motors is None or len(outputs) < _LEAST_ROWS:
         return None
-    channels = _motor_channels(recording.parameters, outputs)
+    channels = [c for c in motors.channels if outputs.value[:, c].any()]
     if not channels:
         return None
-    low = recording.parameters.last("MOT_PWM_MIN", 0.0) or 1000.0
-    high = recording.parameters.last("MOT_PWM_MAX", 0.0) or 2000.0
-    if not high > low:
-        return None
     driven = outputs.value[:, channels]
-    duty = np.clip((driven - low) / (high - low), 0.0, 1.0)
+    duty = np.clip((driven - motors.low) / (motors.high - motors.low), 0.0, 1.0)
     return Series(outputs.time, duty)
 
 
-def _thrust(duty: Series, recording: Recording) -> Series | None:
-    """Mean thrust demand of the motors: the inverse of the firmware's thrust curve.
+def _motors(recording: Recording) -> MotorOutputs | None:
+    if recording.outputs is None:
+        return None
+    count = recording.outputs.value.shape[1]
+    return autopilots.of(recording).motor_outputs(recording.parameters, count)
 
-    Notes
-    -----
-    AP_MotorsMulticopter: output = spin_min + (spin_max − spin_min) · c(thrust), with
-    thrust = (1 − expo) · c + expo · c².
-    """
-    parameters = recording.parameters
-    if not {"MOT_THST_EXPO", "MOT_SPIN_MIN", "MOT_SPIN_MAX"} <= parameters.names:
+
+def _thrust(duty: Series, motors: MotorOutputs | None) -> Series | None:
+    """Mean thrust demand of the motors: the inverse of the firmware's thrust curve."""
+    if motors is None or motors.curve is None:
         return None
-    expo = float(np.clip(parameters.last("MOT_THST_EXPO", 0.65), -1.0, 1.0))
-    spin_min = parameters.last("MOT_SPIN_MIN", 0.15)
-    spin_max = parameters.last("MOT_SPIN_MAX", 0.95)
-    if not spin_max > spin_min:
-        return None
-    curve = np.clip((duty.value - spin_min) / (spin_max - spin_min), 0.0, 1.0)
-    return Series(duty.time, np.mean((1 - expo) * curve + expo * curve**2, axis=1))
+    return Series(duty.time, np.mean(motors.curve.thrust(duty.value), axis=1))
 
 
 def _explains(thrust: Series, throttle: Series) -> bool:

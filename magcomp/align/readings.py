@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from magcomp.autopilots import ardupilot
+from magcomp import autopilots
+from magcomp.autopilots import Kind
 from magcomp.errors import MissingDataError
 from magcomp.model import (
+    Applied,
     BoolArray,
     FloatArray,
     InForce,
@@ -61,7 +65,12 @@ def readings(
         )
     keep = _is_new(reported.value)
     keep &= (reported.time >= start) & (reported.time <= end)
-    keep &= _away_from(reported.time, ardupilot.calibration_changes(recording.parameters))
+    autopilot = autopilots.of(recording)
+    applied = recording.applied.get(compass)
+    corrected = compass not in recording.raw_compasses
+    changes = autopilot.changes(recording.parameters, told_per_reading=applied is not None)
+    if corrected:
+        keep &= _away_from(reported.time, changes)
     keep &= ~_in_gap(reported.time, recording.attitude.time)
     keep &= _usable_state(reported.time, recording.armed)
     if not keep.any():
@@ -70,14 +79,24 @@ def readings(
             f"asked for; instead all {len(reported)} were repeats, gaps or outside it"
         )
     time = reported.time[keep]
-    in_force, stretch = _corrections(recording, compass, time)
+    in_force, stretch = _corrections(recording, compass, time, changes)
+    told_offset = told_motor = None
+    if applied is not None:
+        told_offset, told_motor = applied.offset.value[keep], applied.motor.value[keep]
+        in_force = (*in_force[:-1], _told(in_force[-1], applied))
+    meaning = autopilot.field_meaning(recording.format)
+    value = reported.value[keep]
     return Readings(
         compass=compass,
         time=time,
-        reported=_mend_truncation(reported.value[keep]),
+        reported=_mend_truncation(value) if meaning.truncated else value,
         stretch=stretch,
         in_force=in_force,
         attitude=Series(recording.attitude.time, np.unwrap(recording.attitude.value, axis=0)),
+        corrected=corrected,
+        applied_later=meaning.applied_later_s,
+        told_offset=told_offset,
+        told_motor=told_motor,
     )
 
 
@@ -139,24 +158,51 @@ def _mend_truncation(value: FloatArray) -> FloatArray:
 
 
 def _corrections(
-    recording: Recording, compass: int, time: FloatArray
+    recording: Recording, compass: int, time: FloatArray, changes: tuple[float, ...]
 ) -> tuple[tuple[InForce, ...], IntArray]:
     """Corrections in force, oldest first, the last one being that of the end; which at each time.
 
     Only those of the times are worked out: a log may hold many changes between two readings.
     """
-    moments = np.array([-np.inf, *ardupilot.calibration_changes(recording.parameters)])
+    autopilot = autopilots.of(recording)
+    moments = np.array([-np.inf, *changes])
     last = len(moments) - 1
     period = np.searchsorted(moments, time, side="right") - 1
     periods, stretch = np.unique(np.append(period, last), return_inverse=True)
-    unseen = ardupilot.unseen_names(recording.parameters, compass)
     in_force: list[InForce] = []
     number = np.empty(len(periods), dtype=np.intp)
-    previous: ardupilot.Calibration | None = None
     for index, moment in enumerate(moments[periods].tolist()):
-        calibration = ardupilot.calibration_at(recording.parameters, compass, moment)
-        if previous is None or not calibration.same_as(previous):
-            in_force.append(ardupilot.in_force(calibration, unseen))
-        previous = calibration
+        now = autopilot.in_force_at(recording.parameters, compass, moment)
+        if not in_force or not _corrects_alike(now, in_force[-1]):
+            in_force.append(now)
         number[index] = len(in_force) - 1
     return tuple(in_force), number[stretch[:-1]]
+
+
+def _told(in_force: InForce, applied: Applied) -> InForce:
+    """The present correction, with what the log tells in the place of parameters it does not.
+
+    An offset that the log tells is the one in force, whatever was reported: a vehicle that learns
+    reports its offsets late or never. A motor correction of 0 throughout says that there was none.
+    """
+    offset = applied.offset.value[-1]
+    idle = not applied.motor.value.any()
+    told = {Kind.OFFSET, Kind.MOTOR, Kind.SWITCH} if idle else {Kind.OFFSET}
+    return replace(
+        in_force,
+        correction=replace(in_force.correction, offset=offset),
+        unseen=tuple(
+            name
+            for name in in_force.unseen
+            if (found := autopilots.parse(name)) is None or found.kind not in told
+        ),
+    )
+
+
+def _corrects_alike(one: InForce, other: InForce) -> bool:
+    return (
+        one.regressor == other.regressor
+        and np.array_equal(one.correction.offset, other.correction.offset)
+        and np.array_equal(one.correction.soft_iron, other.correction.soft_iron)
+        and np.array_equal(one.correction.motor, other.correction.motor)
+    )

@@ -12,12 +12,6 @@ from magcomp.model import Control, FloatArray, Lags, Readings, Samples, Series
 
 _RATE_STEP_S = 0.05
 
-APPLIED_LATER_S = 0.05
-"""The firmware corrects a reading with a control quantity this much older than what disturbed it:
-a reading is the mean over one update of 0.1 s, so it is centred 0.05 s ago, and it is corrected
-with the battery or throttle read one update, 0.1 s, ago (ArduCopter 4.6.3; the recording
-flight_wrong_mot shows it)."""
-
 
 def sample(
     readings: Readings, control: Control, in_force: Mapping[str, Control], lags: Lags
@@ -53,7 +47,7 @@ def sample(
     down_rate = (
         gravity_direction(after[:, 0], after[:, 1]) - gravity_direction(before[:, 0], before[:, 1])
     ) / (2 * _RATE_STEP_S)
-    applied = commanded - APPLIED_LATER_S
+    applied = commanded - readings.applied_later
     raw, raw_rate = _undo(readings, in_force, applied)
     return Samples(
         compass=readings.compass,
@@ -86,6 +80,11 @@ def _undo(
     readings: Readings, controls: Mapping[str, Control], applied: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Raw field and its change per second of regressor lag, both of shape (n, 3)."""
+    if not readings.corrected:
+        return readings.reported, np.zeros_like(readings.reported)
+    if readings.told_offset is not None and readings.told_motor is not None:
+        raw = _undo_told(readings, readings.told_offset, readings.told_motor)
+        return raw, np.zeros_like(raw)
     raw = np.empty_like(readings.reported)
     raw_rate = np.zeros_like(raw)
     for index, stretch in enumerate(readings.in_force):
@@ -109,6 +108,17 @@ def _undo(
     return raw, raw_rate
 
 
+def _undo_told(readings: Readings, told_offset: FloatArray, told_motor: FloatArray) -> FloatArray:
+    """Raw field, shape (n, 3), where the log tells offset and motor correction of each reading."""
+    raw = np.empty_like(readings.reported)
+    for index, stretch in enumerate(readings.in_force):
+        rows = readings.stretch == index
+        if rows.any():
+            inverse = np.linalg.inv(stretch.correction.soft_iron)
+            raw[rows] = (readings.reported[rows] - told_motor[rows]) @ inverse.T - told_offset[rows]
+    return raw
+
+
 def _as_now(
     readings: Readings, raw: FloatArray, controls: Mapping[str, Control], applied: FloatArray
 ) -> FloatArray:
@@ -116,6 +126,10 @@ def _as_now(
     present = readings.in_force[-1]
     field = readings.reported.copy()
     rows = readings.stretch != len(readings.in_force) - 1
+    if not readings.corrected:
+        rows[:] = True
+    if readings.told_offset is not None:
+        rows |= np.any(readings.told_offset != present.correction.offset, axis=1)
     if rows.any():
         u = np.zeros(int(rows.sum()))
         if present.regressor is not None and present.regressor in controls:

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from magcomp import autopilots
 from magcomp.align import controls, expected_earth, has_position, readings, reported
 from magcomp.align.health import compass_complaints, current_complaints
-from magcomp.analysis.emit import emit, emit_anyway
-from magcomp.autopilots import ardupilot
+from magcomp.analysis.emit import Emission, emit
 from magcomp.earth import EarthField
 from magcomp.errors import MissingDataError, UsageError
 from magcomp.fit import METHODS, Problem, best_form, fit
@@ -101,7 +101,7 @@ def analyse(
     FitRejectedError
         Where the method asked for cannot work.
     ParameterFileError
-        Where a compass parameter in the recording is not finite.
+        Where every compass asked for has a parameter that is not finite.
     """
     wanted = Options() if options is None else options
     found = _controls_of(recording)
@@ -119,25 +119,29 @@ def analyse(
             judged.setdefault(kind, []).append(result)
     progress("done", 1.0)
     chosen = _choose(judged)
-    parameters = emit(
-        recording, [(j.fit, j.verdict, j.problem.readings.in_force[-1]) for j in judged[chosen]]
-    )
-    insisted = emit_anyway(recording, [j.fit for j in judged[chosen]])
+    emitted = emit(recording, [j.fit for j in judged[chosen]])
+    nothing = all(j.verdict.grade is Grade.REJECTED for j in judged[chosen])
     return Analysis(
         source=recording.source,
         duration_s=recording.duration_s,
         vehicle=recording.vehicle,
         compasses=tuple(
-            CompassResult(
-                fit=j.fit,
-                verdict=j.verdict,
-                in_force=j.problem.readings.in_force[-1].correction,
-                parameters=parameters[j.fit.compass],
-                insisted=insisted[j.fit.compass],
-            )
-            for j in judged[chosen]
+            _result(j, emitted[j.fit.compass], nothing_accepted=nothing) for j in judged[chosen]
         ),
-        notes=tuple(_notes(recording, judged, chosen)),
+        notes=tuple(_notes(recording, wanted, judged, chosen)),
+    )
+
+
+def _result(judged: _Judged, emitted: Emission, *, nothing_accepted: bool) -> CompassResult:
+    rejected = judged.verdict.grade is Grade.REJECTED
+    left_out = {} if nothing_accepted else emitted.left_out
+    return CompassResult(
+        fit=judged.fit,
+        verdict=judged.verdict,
+        in_force=judged.problem.readings.in_force[-1].correction,
+        parameters=left_out if rejected else emitted.accepted,
+        insisted=emitted.accepted,
+        left_out=emitted.left_out,
     )
 
 
@@ -174,9 +178,8 @@ def regressor_in_force(recording: Recording) -> str:
     MissingDataError
         Where the recording holds no control quantity.
     """
-    switch = recording.parameters.last(ardupilot.COMPENSATION_SWITCH, 0.0)
-    named = (kind for kind, value in ardupilot.COMPENSATION_OF.items() if value == switch)
-    return next(named, "") or _controls_of(recording)[0].kind
+    in_force = autopilots.of(recording).regressor(recording.parameters.latest)
+    return in_force or _controls_of(recording)[0].kind
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,32 +230,20 @@ def _kinds(recording: Recording, found: Iterable[Control], wanted: Options) -> l
 
 
 def _compasses(recording: Recording, wanted: Options) -> list[int]:
-    """The compasses to fit; the first cannot be while it is corrected per motor.
-
-    Notes
-    -----
-    COMPASS_PMOT_EN overrides COMPASS_MOTCT for compass 1 (AUTOPILOTS.md).
-    """
-    if recording.vehicle.autopilot != "ardupilot":
-        raise MissingDataError(
-            f"{recording.source} must be of a vehicle with ArduPilot; instead it is of one with "
-            f"{recording.vehicle.autopilot}, whose compass correction is not known yet"
-        )
+    """The compasses to fit: those asked for whose correction can be undone."""
+    autopilot = autopilots.of(recording)
+    autopilot.require_fittable(recording)
     if not recording.field:
         raise MissingDataError(
             f"{recording.source} must hold readings of a compass (RAW_IMU, SCALED_IMU2 or "
             "SCALED_IMU3); instead it holds none"
         )
     asked = sorted(recording.field) if wanted.compass is None else [wanted.compass]
-    if not recording.parameters.last("COMPASS_PMOT_EN", 0.0):
-        return asked
-    left = [compass for compass in asked if compass != 1]
-    if not left:
-        raise MissingDataError(
-            "COMPASS_PMOT_EN must be 0 while compass 1 is recorded; instead it is on, and a "
-            "correction per motor cannot be undone from a log"
-        )
-    return left
+    left_out = autopilot.left_out(recording.parameters)
+    found = [compass for compass in asked if compass not in left_out]
+    if not found:
+        raise left_out[asked[0]]
+    return found
 
 
 def _choose(judged: Mapping[str, list[_Judged]]) -> str:
@@ -277,7 +268,9 @@ def _choose(judged: Mapping[str, list[_Judged]]) -> str:
     return THROTTLE if unexplained(THROTTLE) < BETTER * unexplained(CURRENT) else CURRENT
 
 
-def _notes(recording: Recording, judged: Mapping[str, list[_Judged]], chosen: str) -> Iterable[str]:
+def _notes(
+    recording: Recording, wanted: Options, judged: Mapping[str, list[_Judged]], chosen: str
+) -> Iterable[str]:
     if len(judged) > 1:
         scores = ", ".join(
             f"{kind} leaves "
@@ -295,8 +288,11 @@ def _notes(recording: Recording, judged: Mapping[str, list[_Judged]], chosen: st
             f"the vehicle is a {recording.vehicle.kind}: magcomp is made for multirotors, whose "
             "thrust demand is the throttle the autopilot multiplies"
         )
-    if recording.parameters.last("COMPASS_PMOT_EN", 0.0):
-        yield "compass 1 is left out: COMPASS_PMOT_EN is on, so it is corrected per motor"
+    autopilot = autopilots.of(recording)
+    yield from autopilot.warnings(recording.parameters.latest)
+    for compass, why in sorted(autopilot.left_out(recording.parameters).items()):
+        if compass in recording.field and wanted.compass is None:
+            yield f"compass {compass} is left out: {why}"
     if not recording.parameters.names:
         yield (
             "the log holds no parameters: the calibration in force is unknown, so only the motor "

@@ -2,109 +2,65 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 
-import numpy as np
-
-from magcomp import __version__
-from magcomp.autopilots import ardupilot
-from magcomp.model import Analysis, Grade, InForce, MotorFit, ParameterSet, Recording, Verdict
+from magcomp import __version__, autopilots
+from magcomp.autopilots import Kind
+from magcomp.model import Analysis, CompassResult, Grade, MotorFit, ParameterSet, Recording
 
 
-def emit(
-    recording: Recording, results: Sequence[tuple[MotorFit, Verdict, InForce]]
-) -> Mapping[int, Mapping[str, float]]:
-    """Parameters of each compass.
+@dataclass(frozen=True)
+class Emission:
+    """What may be written of one compass.
+
+    Attributes
+    ----------
+    accepted
+        Its whole correction, the switch, and zeros for the stored motor vectors of compasses that
+        were not fitted and would come into force with the switch.
+    left_out
+        What it needs where it gets no correction though another compass does: the switch is one
+        for all, so its stored vector must not come into force with it.
+    """
+
+    accepted: Mapping[str, float]
+    left_out: Mapping[str, float]
+
+
+def emit(recording: Recording, fits: Sequence[MotorFit]) -> Mapping[int, Emission]:
+    """Parameters of each compass, whatever the verdict.
 
     Parameters
     ----------
     recording
         Tells which parameters this vehicle has, and their values.
-    results
-        Fit, verdict and what was in force, a compass each, all against one control quantity.
-
-    Returns
-    -------
-    mapping of compass to parameters
-        A whole correction for each compass: motor vector, offsets re-centred for it, soft iron.
-        COMPASS_MOTCT is one switch for all, so it stands with every compass, and with it zeros
-        for the stored motor vectors of compasses that were not fitted and would come into force.
-        A rejected compass gets zeros likewise. Empty where every compass is rejected: then the
-        switch is not touched either.
+    fits
+        One a compass, all against one control quantity.
     """
-    if all(verdict.grade is Grade.REJECTED for _, verdict, _ in results):
-        return {fit.compass: {} for fit, _, _ in results}
-    fitted = [fit.compass for fit, _, _ in results]
-    return {
-        fit.compass: _for_this_vehicle(
-            recording,
-            _accepted(recording, fit, fitted)
-            if verdict.grade is not Grade.REJECTED
-            else _neutral(fit, in_force),
-            "diagonal" in fit.free,
-        )
-        for fit, verdict, in_force in results
-    }
-
-
-def emit_anyway(recording: Recording, fits: Sequence[MotorFit]) -> Mapping[int, dict[str, float]]:
-    """Parameters of each compass whatever the verdict, for a user who insists."""
+    autopilot = autopilots.of(recording)
+    values = recording.parameters.latest
     fitted = [fit.compass for fit in fits]
     return {
-        fit.compass: _for_this_vehicle(
-            recording, _accepted(recording, fit, fitted), "diagonal" in fit.free
+        fit.compass: Emission(
+            accepted={
+                **autopilot.switch_parameters(fit.regressor, fitted, values),
+                **autopilot.correction_parameters(
+                    fit.correction, fit.compass, values, soft_iron_fitted="diagonal" in fit.free
+                ),
+            },
+            left_out=autopilot.neutral_parameters(fit.compass, fit.regressor, values),
         )
         for fit in fits
     }
 
 
-def _accepted(recording: Recording, fit: MotorFit, fitted: Sequence[int]) -> dict[str, float]:
-    scale_name = f"COMPASS_SCALE{ardupilot.suffix(fit.compass)}"
-    scale = recording.parameters.last(scale_name, 1.0)
-    used = scale if 1 / ardupilot.SCALE_LIMIT <= scale <= ardupilot.SCALE_LIMIT else 1.0
-    return {
-        **_switch(recording, fit, fitted),
-        **ardupilot.correction_parameters(fit.correction, fit.compass, used),
-    }
-
-
-def _switch(recording: Recording, fit: MotorFit, fitted: Sequence[int]) -> dict[str, float]:
-    """COMPASS_MOTCT, and zeros for what it would wake up on compasses that were not fitted."""
-    name, value = ardupilot.COMPENSATION_SWITCH, float(ardupilot.COMPENSATION_OF[fit.regressor])
-    parameters = {name: value}
-    if recording.parameters.last(name, 0.0) == value:
-        return parameters
-    for compass in range(1, ardupilot.COMPASS_COUNT + 1):
-        stored = [recording.parameters.last(n, 0.0) for n in ardupilot.vector_names("MOT", compass)]
-        if compass not in fitted and any(stored):
-            parameters |= ardupilot.vector_parameters("MOT", compass, np.zeros(3))
-    return parameters
-
-
-def _neutral(fit: MotorFit, in_force: InForce) -> dict[str, float]:
-    if in_force.regressor == fit.regressor:
-        return {}
-    return ardupilot.vector_parameters("MOT", fit.compass, np.zeros(3))
-
-
-def _for_this_vehicle(
-    recording: Recording, parameters: dict[str, float], fitted: bool
-) -> dict[str, float]:
-    """Without the names this firmware does not know, or all of a correction where none is known."""
-    known = recording.parameters.names
-    if not known:
-        return {name: v for name, v in parameters.items() if "_MOT" in name}
-    if not any(name.startswith("COMPASS_MOT") for name in known):
-        return parameters
-    # A soft iron that was fitted belongs to its offsets, even where the log's list is not whole.
-    return {n: value for n, value in parameters.items() if n in known or _is_fitted(n, fitted)}
-
-
-def _is_fitted(name: str, fitted_soft_iron: bool) -> bool:
-    return fitted_soft_iron and ("_DIA" in name or "_ODI" in name)
-
-
-def parameter_set(analysis: Analysis, *, include_rejected: bool = False) -> ParameterSet:
+def parameter_set(
+    analysis: Analysis,
+    *,
+    include_rejected: bool = False,
+    compasses: Collection[int] | None = None,
+) -> ParameterSet:
     """The parameters of an analysis, with what a reader of the file should know.
 
     Parameters
@@ -113,20 +69,39 @@ def parameter_set(analysis: Analysis, *, include_rejected: bool = False) -> Para
         From :func:`magcomp.analysis.analyse`.
     include_rejected
         Write rejected fits too; the user insists.
+    compasses
+        Those whose fits the user accepts; all by default. One that is left out is never brought
+        into force by the switch that serves the others.
+
+    Returns
+    -------
+    ParameterSet
+        Empty where no fit is accepted: then the switch is not touched either.
     """
+    accepted = [
+        result
+        for result in analysis.compasses
+        if (include_rejected or result.verdict.grade is not Grade.REJECTED)
+        and (compasses is None or result.fit.compass in compasses)
+    ]
     values: dict[str, float] = {}
     for result in analysis.compasses:
-        values.update(result.insisted if include_rejected else result.parameters)
+        if result in accepted:
+            values.update(result.insisted if include_rejected else result.parameters)
+        elif accepted:
+            values.update(result.left_out)
     ordered = {name: values[name] for name in sorted(values, key=_order)}
-    return ParameterSet(ordered, analysis.vehicle, tuple(_comments(analysis)))
+    comments = tuple(_comments(analysis, accepted))
+    return ParameterSet(ordered, analysis.vehicle, comments)
 
 
 def _order(name: str) -> tuple[bool, str]:
     """The switch last, as it should be written."""
-    return name == ardupilot.COMPENSATION_SWITCH, name
+    found = autopilots.parse(name)
+    return found is not None and found.kind is Kind.SWITCH, name
 
 
-def _comments(analysis: Analysis) -> list[str]:
+def _comments(analysis: Analysis, accepted: Sequence[CompassResult]) -> list[str]:
     vehicle = analysis.vehicle
     lines = [
         f"magcomp {__version__}: compass-motor compensation",
@@ -138,6 +113,7 @@ def _comments(analysis: Analysis) -> list[str]:
         lines.append(
             f"compass {result.fit.compass}: {result.verdict.grade.value}, {result.fit.method} "
             f"against {result.fit.regressor}"
+            + ("" if result in accepted or not accepted else "; left out")
         )
         lines.extend(f"  {reason}" for reason in result.verdict.reasons)
     return lines

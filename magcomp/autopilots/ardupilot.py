@@ -1,280 +1,269 @@
-"""ArduPilot's compass correction, forward and backward, and the names it goes by.
-
-The order inside the autopilot (AP_Compass, checked against ArduCopter 4.6.3)::
-
-    corrected = D · (s · (raw + OFS)) + MOT · u
-
-Fields on the link are *corrected* fields of compass priority 1, 2, 3, in body
-axes, mGauss, truncated to whole numbers.
-"""
+"""ArduPilot: every fact of it that magcomp needs (ArduCopter 4.6.3; docs/autopilots.md)."""
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Mapping
-from dataclasses import dataclass
-from enum import IntEnum
+from collections.abc import Collection, Mapping
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
-from magcomp.errors import ParameterFileError
-from magcomp.model import CURRENT, THROTTLE, Correction, InForce, ParameterHistory
-
-FloatArray = NDArray[np.float64]
-
-SCALE_LIMIT = 1.5
-"""COMPASS_SCALE is in force only between 1/1.5 and 1.5."""
-
-OFFSETS_MAX_DEFAULT = 1800.0
-"""Arming needs every |OFS| at or under COMPASS_OFFS_MAX."""
-
-COMPASS_COUNT = 3
-
-COMPENSATION_SWITCH = "COMPASS_MOTCT"
-
-_AXES = ("X", "Y", "Z")
-# All that act on a reading, in alphabetical order. Asked for by name: a log may hold any number of
-# others.
-_COMPASS_NAMES = tuple(
-    sorted(
-        [
-            *(
-                f"COMPASS_{kind}{number}_{axis}"
-                for kind in ("OFS", "DIA", "ODI", "MOT")
-                for number in ("", "2", "3")
-                for axis in _AXES
-            ),
-            *(
-                f"COMPASS_{kind}{number}"
-                for kind in ("SCALE", "DEV_ID")
-                for number in ("", "2", "3")
-            ),
-            "COMPASS_MOTCT",
-            "COMPASS_PMOT_EN",
-        ]
-    )
+from magcomp.autopilots import ardupilot_settings
+from magcomp.autopilots.ardupilot_correction import (
+    COMPENSATION_OF,
+    Calibration,
+    FloatArray,
+    MotorCompensation,
+    calibration,
+    calibration_at,
+    calibration_changes,
+    correct,
+    correction_parameters,
+    in_force,
+    scale_in_force,
+    soft_iron_matrix,
+    soft_iron_parameters,
+    uncorrect,
+    unseen,
+    vector_parameters,
 )
+from magcomp.autopilots.ardupilot_names import (
+    ACTING,
+    COMPASS_COUNT,
+    COMPENSATION_SWITCH,
+    NUMBERS,
+    PER_MOTOR_SWITCH,
+    integer_type,
+    parse,
+    single_name,
+    suffix,
+    vector_names,
+)
+from magcomp.autopilots.protocol import (
+    FieldMeaning,
+    Kind,
+    LagPrior,
+    LagPriors,
+    MotorOutputs,
+    ParameterName,
+    ThrustCurve,
+)
+from magcomp.errors import InputError
+from magcomp.model import Compass, Correction, InForce, ParameterHistory, Recording
+
+_MOTOR_FUNCTIONS = frozenset([*range(33, 41), *range(82, 86)])
+_DEFAULT_MOTORS = 4
+_OUTPUTS_ASKED_FOR = 8
+_CURVE_NAMES = ("MOT_THST_EXPO", "MOT_SPIN_MIN", "MOT_SPIN_MAX")
+_PWM_NAMES = ("MOT_PWM_MIN", "MOT_PWM_MAX")
+_TOLD_PER_READING = (Kind.OFFSET, Kind.MOTOR)
+
+_LINK = LagPriors(LagPrior(0.08, 0.1), LagPrior(0.08, 0.1))
+"""A reading is the mean over one update of 0.1 s, and waits for the stream that sends it."""
+
+_LOGGED = LagPriors(LagPrior(0.05, 0.05), LagPrior(0.05, 0.1))
+"""A reading is the mean over one update of 0.1 s, and is logged when it is made."""
 
 
-class MotorCompensation(IntEnum):
-    """COMPASS_MOTCT: one switch for all compasses, and what u is."""
+class ArduPilot:
+    """See :class:`magcomp.autopilots.protocol.Autopilot`."""
 
-    OFF = 0
-    THROTTLE = 1
-    CURRENT = 2
+    key = "ardupilot"
+    title = "ArduPilot"
+    mavlink_number = 3
+    integers_as_bytes = False
+    switch = COMPENSATION_SWITCH
+    compass_prefix = "COMPASS_"
+    device_id_names = tuple(single_name("DEV_ID", compass) for compass in NUMBERS)
+    device_ids_describe = "bus, address and type of a sensor, which are alike in vehicles of a kind"
 
+    def require_fittable(self, recording: Recording) -> None:
+        """Everything of ArduPilot that can be read can be fitted."""
 
-COMPENSATION_OF = {CURRENT: MotorCompensation.CURRENT, THROTTLE: MotorCompensation.THROTTLE}
-"""COMPASS_MOTCT that makes the autopilot multiply by a control quantity."""
+    def field_meaning(self, source_format: str) -> FieldMeaning:  # noqa: ARG002
+        """The same in every source: the dataflash log casts to int16 as the link does.
 
-_REGRESSOR_OF = {switch: kind for kind, switch in COMPENSATION_OF.items()}
+        Notes
+        -----
+        A reading is the mean over one update of 0.1 s, so it is centred 0.05 s ago, and it is
+        corrected with the battery or throttle read one update, 0.1 s, ago (ArduCopter 4.6.3; the
+        recording flight_wrong_mot shows it).
+        """
+        return FieldMeaning(truncated=True, applied_later_s=0.05)
 
+    def lag_priors(self, source_format: str) -> LagPriors:
+        """The dataflash log stamps a reading where it is made, a link where it is sent."""
+        return _LOGGED if source_format == "dataflash" else _LINK
 
-@dataclass(frozen=True, eq=False)
-class Calibration:
-    """Everything ArduPilot does to one compass.
+    def motor_outputs(self, parameters: ParameterHistory, outputs: int) -> MotorOutputs | None:
+        """By SERVOn_FUNCTION, else the first four; their limits MOT_PWM_MIN and _MAX.
 
-    Attributes
-    ----------
-    offset
-        COMPASS_OFS, mGauss, shape (3,); added to the raw field.
-    soft_iron
-        D, symmetric, shape (3, 3), from COMPASS_DIA and COMPASS_ODI.
-    scale
-        COMPASS_SCALE as used; 1 where it is out of limits.
-    motor
-        COMPASS_MOT, mGauss per unit of u, shape (3,); zero where switched off.
-    compensation
-        What u is.
-    """
-
-    offset: FloatArray
-    soft_iron: FloatArray
-    scale: float
-    motor: FloatArray
-    compensation: MotorCompensation
-
-    def same_as(self, other: Calibration) -> bool:
-        """Whether both correct every reading alike."""
-        return (
-            np.array_equal(self.offset, other.offset)
-            and np.array_equal(self.soft_iron, other.soft_iron)
-            and self.scale == other.scale
-            and np.array_equal(self.motor, other.motor)
-            and self.compensation == other.compensation
+        Notes
+        -----
+        AP_MotorsMulticopter: output = spin_min + (spin_max − spin_min) · c(thrust), with
+        thrust = (1 − expo) · c + expo · c².
+        """
+        by_function = [
+            index
+            for index in range(outputs)
+            if parameters.last(f"SERVO{index + 1}_FUNCTION", 0.0) in _MOTOR_FUNCTIONS
+        ]
+        channels = by_function or range(min(_DEFAULT_MOTORS, outputs))
+        low, high = (
+            parameters.last(name, 0.0) or default
+            for name, default in zip(_PWM_NAMES, (1000.0, 2000.0), strict=True)
         )
+        if not high > low:
+            return None
+        return MotorOutputs(tuple(channels), low, high, self._thrust_curve(parameters))
 
-    @property
-    def has_soft_iron(self) -> bool:
-        """Whether a soft-iron correction other than the identity is in force."""
-        return not np.allclose(self.soft_iron, np.eye(3))
+    @staticmethod
+    def _thrust_curve(parameters: ParameterHistory) -> ThrustCurve | None:
+        if not set(_CURVE_NAMES) <= parameters.names:
+            return None
+        expo, spin_min, spin_max = (parameters.last(name, 0.0) for name in _CURVE_NAMES)
+        if not spin_max > spin_min:
+            return None
+        return ThrustCurve(float(np.clip(expo, -1.0, 1.0)), spin_min, spin_max)
 
+    def parse(self, name: str) -> ParameterName | None:
+        """See :func:`magcomp.autopilots.ardupilot_names.parse`."""
+        return parse(name)
 
-def suffix(compass: int) -> str:
-    """Number in a parameter's name: compass 1 has none."""
-    return "" if compass == 1 else str(compass)
+    def integer_type(self, name: str) -> int | None:
+        """INT8 for switches, INT16 and INT32 for what is larger."""
+        return integer_type(name)
 
+    def choices(self, name: str) -> tuple[int, ...]:
+        """COMPASS_MOTCT is off, by throttle or by current."""
+        if name == COMPENSATION_SWITCH:
+            return tuple(MotorCompensation)
+        return (0, 1) if name == PER_MOTOR_SWITCH else ()
 
-def vector_names(kind: str, compass: int) -> tuple[str, str, str]:
-    """Three names of a vector, for example COMPASS_MOT2_X, _Y, _Z.
+    def compasses(self, values: Mapping[str, float]) -> tuple[Compass, ...]:
+        """By COMPASS_DEV_ID, and what COMPASS_EXTERNAL, ORIENT and USE say of each."""
+        return ardupilot_settings.compasses(values)
 
-    Parameters
-    ----------
-    kind
-        ``"OFS"``, ``"DIA"``, ``"ODI"`` or ``"MOT"``.
-    """
-    x, y, z = (f"COMPASS_{kind}{suffix(compass)}_{axis}" for axis in _AXES)
-    return x, y, z
-
-
-def soft_iron_matrix(diagonal: ArrayLike, off_diagonal: ArrayLike) -> FloatArray:
-    """D from COMPASS_DIA and COMPASS_ODI, shape (3, 3); the identity where DIA is all zero."""
-    dx, dy, dz = np.asarray(diagonal, float)
-    ox, oy, oz = np.asarray(off_diagonal, float)
-    if dx == dy == dz == 0.0:
-        return np.eye(3)
-    return np.array([[dx, ox, oy], [ox, dy, oz], [oy, oz, dz]])
-
-
-def soft_iron_parameters(matrix: FloatArray, compass: int) -> dict[str, float]:
-    """COMPASS_DIA and COMPASS_ODI from a symmetric D."""
-    diagonal = (matrix[0, 0], matrix[1, 1], matrix[2, 2])
-    off_diagonal = (matrix[0, 1], matrix[0, 2], matrix[1, 2])
-    return {
-        **vector_parameters("DIA", compass, diagonal),
-        **vector_parameters("ODI", compass, off_diagonal),
-    }
-
-
-def vector_parameters(kind: str, compass: int, vector: ArrayLike) -> dict[str, float]:
-    """A vector's three parameters, as the float32 the autopilot stores."""
-    values = np.asarray(vector, float)
-    return {
-        name: float(np.float32(value))
-        for name, value in zip(vector_names(kind, compass), values, strict=True)
-    }
-
-
-def unseen_names(parameters: ParameterHistory, compass: int) -> tuple[str, ...]:
-    """Parameters that act on a compass and were never reported, in the order of the firmware.
-
-    Notes
-    -----
-    Every firmware has COMPASS_OFS, COMPASS_MOT and COMPASS_MOTCT. Those without soft iron have
-    neither COMPASS_DIA nor COMPASS_ODI; one of them alone is a list with a gap.
-    """
-    soft_iron = (*vector_names("DIA", compass), *vector_names("ODI", compass))
-    wanted = [*vector_names("OFS", compass), *vector_names("MOT", compass), COMPENSATION_SWITCH]
-    if any(name in parameters.names for name in soft_iron):
-        wanted += soft_iron
-    return tuple(name for name in wanted if name not in parameters.names)
-
-
-def in_force(calibration: Calibration, unseen: tuple[str, ...] = ()) -> InForce:
-    """What a calibration does to a reading, in magcomp's own terms."""
-    return InForce(
-        correction=Correction(
-            offset=calibration.offset,
-            soft_iron=calibration.scale * calibration.soft_iron,
-            motor=calibration.motor,
-        ),
-        regressor=_REGRESSOR_OF.get(calibration.compensation),
-        unseen=unseen,
-    )
-
-
-def correction_parameters(correction: Correction, compass: int, scale: float) -> dict[str, float]:
-    """COMPASS_OFS, DIA, ODI and MOT that make the autopilot apply a correction.
-
-    Parameters
-    ----------
-    correction
-        corrected = soft_iron · (raw + offset) + motor · u.
-    compass
-        1, 2 or 3.
-    scale
-        COMPASS_SCALE as in force; it stays, so D = soft_iron / scale.
-    """
-    return {
-        **vector_parameters("OFS", compass, correction.offset),
-        **soft_iron_parameters(correction.soft_iron / scale, compass),
-        **vector_parameters("MOT", compass, correction.motor),
-    }
-
-
-def calibration(values: Mapping[str, float], compass: int) -> Calibration:
-    """Calibration of one compass; names not among ``values`` have the firmware's defaults."""
-
-    def vector(kind: str) -> FloatArray:
-        return np.array([values.get(name, 0.0) for name in vector_names(kind, compass)])
-
-    scale = values.get(f"COMPASS_SCALE{suffix(compass)}", 1.0)
-    kind = values.get("COMPASS_MOTCT", 0.0)
-    compensation = MotorCompensation(int(kind)) if kind in (0.0, 1.0, 2.0) else MotorCompensation(0)
-    off = compensation is MotorCompensation.OFF
-    return Calibration(
-        offset=vector("OFS"),
-        soft_iron=soft_iron_matrix(vector("DIA"), vector("ODI")),
-        scale=scale if 1 / SCALE_LIMIT <= scale <= SCALE_LIMIT else 1.0,
-        motor=np.zeros(3) if off else vector("MOT"),
-        compensation=compensation,
-    )
-
-
-def calibration_at(parameters: ParameterHistory, compass: int, time: float) -> Calibration:
-    """Calibration of one compass in force at a time.
-
-    Raises
-    ------
-    ParameterFileError
-        Where a compass parameter of the log is not a finite number.
-    """
-    values = {}
-    for name in _COMPASS_NAMES:
-        if not parameters.of(name):
-            continue
-        value = parameters.at(name, time, 0.0)
-        if not np.isfinite(value):
-            raise ParameterFileError(
-                f"{name} must be a finite number; instead the log holds {value} at {time:.1f} s"
+    def changes(
+        self, parameters: ParameterHistory, *, told_per_reading: bool = False
+    ) -> tuple[float, ...]:
+        """Any report of an acting parameter with another value than before."""
+        names = ACTING
+        if told_per_reading:
+            names = tuple(
+                name
+                for name in ACTING
+                if (found := parse(name)) is None or found.kind not in _TOLD_PER_READING
             )
-        values[name] = value
-    return calibration(values, compass)
+        return calibration_changes(parameters, names)
+
+    def in_force(self, values: Mapping[str, float], compass: int) -> InForce:
+        """Every parameter acts at once, armed or not."""
+        return in_force(calibration(values, compass))
+
+    def in_force_at(self, parameters: ParameterHistory, compass: int, time: float) -> InForce:
+        """Every parameter acts from its report, armed or not."""
+        return in_force(calibration_at(parameters, compass, time), unseen(parameters, compass))
+
+    def regressor(self, values: Mapping[str, float]) -> str | None:
+        """COMPASS_MOTCT serves all compasses."""
+        return in_force(calibration(values, 1)).regressor
+
+    def left_out(self, parameters: ParameterHistory) -> Mapping[int, InputError]:
+        """Compass 1 while it is corrected per motor, and compasses with a value that is none."""
+        return ardupilot_settings.left_out(parameters)
+
+    def correction_parameters(
+        self,
+        correction: Correction,
+        compass: int,
+        values: Mapping[str, float],
+        *,
+        soft_iron_fitted: bool,
+    ) -> dict[str, float]:
+        """COMPASS_OFS, DIA, ODI and MOT; COMPASS_SCALE stays as it is.
+
+        A motor vector alone where nothing is known of the vehicle: its offsets are unknown then.
+        """
+        made = correction_parameters(correction, compass, scale_in_force(values, compass))
+        if not values:
+            return {name: value for name, value in made.items() if _is(name, Kind.MOTOR)}
+        if not any(_is(name, Kind.MOTOR) or name == COMPENSATION_SWITCH for name in values):
+            return made
+        # A soft iron that was fitted belongs to its offsets, even where the list is not whole.
+        return {
+            name: value
+            for name, value in made.items()
+            if name in values or (soft_iron_fitted and _is(name, Kind.DIAGONAL, Kind.OFF_DIAGONAL))
+        }
+
+    def switch_parameters(
+        self, regressor: str, compasses: Collection[int], values: Mapping[str, float]
+    ) -> dict[str, float]:
+        """COMPASS_MOTCT, and zeros for what it would wake."""
+        made = {COMPENSATION_SWITCH: float(COMPENSATION_OF[regressor])}
+        for compass in NUMBERS:
+            stored = (values.get(name, 0.0) for name in vector_names("MOT", compass))
+            if compass not in compasses and any(stored):
+                made |= self.neutral_parameters(compass, regressor, values)
+        return made
+
+    def neutral_parameters(
+        self, compass: int, regressor: str, values: Mapping[str, float]
+    ) -> dict[str, float]:
+        """COMPASS_MOT of zeros, unless it is in force for the same quantity already."""
+        if self.regressor(values) == regressor:
+            return {}
+        return vector_parameters("MOT", compass, np.zeros(3))
+
+    def relevant_names(self) -> tuple[str, ...]:
+        """Everything that acts on a reading, and the settings that are warned of."""
+        return ardupilot_settings.relevant_names()
+
+    def useful_names(self) -> tuple[str, ...]:
+        """The thrust curve, and whether there is a current sensor."""
+        return (*_CURVE_NAMES, *_PWM_NAMES, "BATT_MONITOR")
+
+    def output_names(self) -> tuple[str, ...]:
+        """SERVOn_FUNCTION of the first eight."""
+        return tuple(f"SERVO{n}_FUNCTION" for n in range(1, _OUTPUTS_ASKED_FOR + 1))
+
+    def warnings(self, values: Mapping[str, float]) -> tuple[str, ...]:
+        """Of COMPASS_PMOT_EN, LEARN, USE, SCALE, ORIENT and OFFS_MAX."""
+        return tuple(ardupilot_settings.warnings(values))
+
+    def write_warnings(
+        self, asked: Mapping[str, float], values: Mapping[str, float]
+    ) -> tuple[str, ...]:
+        """Of vectors without their switch."""
+        return tuple(ardupilot_settings.write_warnings(asked, values))
+
+    def no_compass_hint(self) -> str:
+        """The switch of all compasses, and the message of the first."""
+        return "is COMPASS_ENABLE 1, and does the link carry RAW_IMU?"
 
 
-def calibration_changes(parameters: ParameterHistory) -> tuple[float, ...]:
-    """Times at which any parameter that acts on a compass reading changed its value."""
-    times: set[float] = set()
-    for name in _COMPASS_NAMES:
-        reports = parameters.of(name)
-        times.update(
-            later.time
-            for earlier, later in itertools.pairwise(reports)
-            if later.value != earlier.value
-        )
-    return tuple(sorted(times))
+def _is(name: str, *kinds: Kind) -> bool:
+    found = parse(name)
+    return found is not None and found.kind in kinds
 
 
-def correct(raw: ArrayLike, u: ArrayLike, calibration: Calibration) -> FloatArray:
-    """Corrected field, mGauss, as the autopilot computes it.
-
-    Parameters
-    ----------
-    raw
-        Sensor field in body axes, mGauss, shape (..., 3).
-    u
-        Control quantity in the unit of ``calibration.compensation``, shape (...).
-    """
-    linear = calibration.scale * (np.asarray(raw, float) + calibration.offset)
-    motor = np.multiply.outer(np.asarray(u, float), calibration.motor)
-    return np.asarray(linear @ calibration.soft_iron.T + motor)
-
-
-def uncorrect(corrected: ArrayLike, u: ArrayLike, calibration: Calibration) -> FloatArray:
-    """Sensor field from a corrected one: the inverse of :func:`correct`."""
-    motor = np.multiply.outer(np.asarray(u, float), calibration.motor)
-    linear = np.linalg.solve(
-        calibration.soft_iron, (np.asarray(corrected, float) - motor)[..., None]
-    )
-    return np.asarray(linear[..., 0] / calibration.scale - calibration.offset)
+__all__ = [
+    "COMPASS_COUNT",
+    "COMPENSATION_OF",
+    "COMPENSATION_SWITCH",
+    "ArduPilot",
+    "Calibration",
+    "FloatArray",
+    "MotorCompensation",
+    "calibration",
+    "calibration_at",
+    "calibration_changes",
+    "correct",
+    "correction_parameters",
+    "in_force",
+    "soft_iron_matrix",
+    "soft_iron_parameters",
+    "suffix",
+    "uncorrect",
+    "vector_names",
+    "vector_parameters",
+]

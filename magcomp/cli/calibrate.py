@@ -27,7 +27,6 @@ from magcomp.cli.linking import (
 )
 from magcomp.cli.options import check_output, json_option, method_option, regressor_option
 from magcomp.cli.output import answer, complain, look, progress
-from magcomp.cli.work import present_parameters
 from magcomp.cli.writing import agreed, carry_out, need_consent, show_difference
 from magcomp.errors import ExitCode, InputError, UsageError
 from magcomp.link import Replay, parse_address
@@ -282,7 +281,7 @@ def _show(recording: Recording, analysis: Analysis, chosen: ParameterSet, wishes
 
     # Before an upload the difference to the vehicle itself is shown.
     shown = {} if wishes.upload else chosen.values
-    present = present_parameters(recording)
+    present = recording.parameters.latest
     answer(as_text.analysis_text(analysis, shown, present, look(), advise=False))
     if written is not None:
         complain(f"Written to {written}")

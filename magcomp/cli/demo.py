@@ -14,12 +14,12 @@ from pathlib import Path
 
 import click
 
+from magcomp import autopilots
 from magcomp.analysis import Options, parameter_set
 from magcomp.cli.linking import StatusLine
 from magcomp.cli.output import answer, look, progress
 from magcomp.cli.truth import KnownTruth
-from magcomp.cli.work import present_parameters
-from magcomp.compensate import from_parameters, track
+from magcomp.compensate import track
 from magcomp.errors import ExitCode, LinkError, MissingDataError
 from magcomp.experiments.motion import HeadingAccuracy, accuracy
 from magcomp.link import DEFAULT_RATES
@@ -77,7 +77,7 @@ def demo(seed: int, speed: float) -> ExitCode:
         bench = _Bench(Path(directory), seed, speed)
         _title("a flight")
         _line(
-            f"A simulated ArduCopter (seed {seed}) with three compasses, over UDP, {speed:g} times "
+            f"A simulated copter (seed {seed}) with three compasses, over UDP, {speed:g} times "
             "faster than real time."
         )
         recording, analysis, wrote = _calibrated(bench, status)
@@ -215,7 +215,7 @@ def _line(text: str) -> None:
 def _show_analysis(recording: Recording, analysis: Analysis, chosen: ParameterSet) -> None:
     from magcomp.report import as_text  # noqa: PLC0415 - rich only where text is made
 
-    present = present_parameters(recording)
+    present = recording.parameters.latest
     answer("\n")
     answer(as_text.analysis_text(analysis, chosen.values, present, look(), advise=False))
 
@@ -244,10 +244,10 @@ def _show_flown(bench: _Bench, before: Recording, after: Recording) -> None:
 
 def _errors(recording: Recording, path: Path) -> Mapping[int, HeadingAccuracy]:
     """Heading as the autopilot's own correction gave it, against the true heading."""
-    truth, values = read_truth(path), present_parameters(recording)
+    truth, values = read_truth(path), recording.parameters.latest
     found = {}
     for compass in sorted(recording.field):
-        in_force = from_parameters(values, compass)
+        in_force = autopilots.of(recording).in_force(values, compass)
         made = track(recording, compass, in_force.correction, in_force.regressor)
         judged = accuracy(truth, made.time, made.reported)
         if judged is None:
@@ -261,13 +261,18 @@ def _show_truth(bench: _Bench, recording: Recording, analysis: Analysis) -> None
     from magcomp.report import as_text  # noqa: PLC0415 - rich only where text is made
 
     truth = KnownTruth(bench.path("truth.json"))
-    before = present_parameters(recording)
+    autopilot, before = autopilots.of(recording), recording.parameters.latest
     after = {**before, **parameter_set(analysis).values}
     compasses = [result.fit.compass for result in analysis.compasses]
 
     def worst(parameters: Mapping[str, float], amperes: float) -> float:
         return max(
-            truth.heading_error_deg(parameters, compass, amperes, recording.start_unix_s)
+            truth.heading_error_deg(
+                autopilot.in_force(parameters, compass).correction,
+                compass,
+                amperes,
+                recording.start_unix_s,
+            )
             for compass in compasses
         )
 

@@ -18,7 +18,7 @@ from magcomp.cli.options import (
     verbose_option,
 )
 from magcomp.cli.output import answer, complain, look
-from magcomp.cli.work import fit_log, present_parameters
+from magcomp.cli.work import fit_log
 from magcomp.errors import ExitCode
 from magcomp.model import Grade
 from magcomp.report import as_json
@@ -90,7 +90,7 @@ def fit(
         # Rich is only worth its import where an answer is for people.
         from magcomp.report import as_text  # noqa: PLC0415
 
-        present = present_parameters(recording)
+        present = recording.parameters.latest
         answer(
             as_text.analysis_text(
                 analysis,

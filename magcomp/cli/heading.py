@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -12,14 +12,15 @@ from typing import Any
 import click
 import numpy as np
 
-from magcomp import __version__
+from magcomp import __version__, autopilots
 from magcomp.analysis import Options
+from magcomp.autopilots import Autopilot
 from magcomp.cli.heading_live import Following, follow, is_live
 from magcomp.cli.linking import LinkOptions, positive_seconds, reach_options
 from magcomp.cli.options import Selection, selection_options
 from magcomp.cli.output import answer, complain, look
-from magcomp.cli.work import fit_log, present_parameters
-from magcomp.compensate import Gravity, Track, from_parameters, track
+from magcomp.cli.work import fit_log
+from magcomp.compensate import Gravity, Track, track
 from magcomp.errors import ExitCode, MissingDataError, ParameterFileError, UsageError
 from magcomp.experiments.motion import HeadingAccuracy, accuracy, heading_errors
 from magcomp.geometry import wrap_angle
@@ -113,7 +114,7 @@ def heading(
                 f"--plot, --gravity, --start and --end must come with a log; instead received "
                 f"one with {source}"
             )
-        chosen = {} if parameters is None else _chosen(parameters)
+        chosen = {} if parameters is None else _chosen(parameters, autopilots.ALL)
         wanted = Following(compass, chosen, positive_seconds(seconds) or math.inf, to_json)
         whom = replace(link, system=selection.system, component=selection.component)
         return follow(source, whom, wanted)
@@ -157,18 +158,19 @@ def _correction(
             (f"a fit of this log ({result.verdict.grade.value})"),
         )
     recording = read(log, system=selection.system, component=selection.component)
-    values = present_parameters(recording)
+    autopilot, values = autopilots.of(recording), recording.parameters.latest
     if parameters is None:
-        return recording, from_parameters(values, compass), "the log's own parameters"
-    chosen = _chosen(parameters)
-    return recording, from_parameters({**values, **chosen}, compass), str(parameters)
+        return recording, autopilot.in_force(values, compass), "the log's own parameters"
+    chosen = _chosen(parameters, [autopilot])
+    return recording, autopilot.in_force({**values, **chosen}, compass), str(parameters)
 
 
-def _chosen(parameters: Path) -> Mapping[str, float]:
+def _chosen(parameters: Path, known: Sequence[Autopilot]) -> Mapping[str, float]:
     chosen = read_parameter_file(parameters).values
-    if not any(name.startswith("COMPASS_") for name in chosen):
+    prefixes = tuple(autopilot.compass_prefix for autopilot in known)
+    if not any(name.startswith(prefixes) for name in chosen):
         raise ParameterFileError(
-            f"{parameters} must hold COMPASS_ parameters; instead it holds none"
+            f"{parameters} must hold {' or '.join(prefixes)} parameters; instead it holds none"
         )
     return chosen
 

@@ -12,7 +12,6 @@ from threading import Event
 from magcomp.align import expected_earth, has_position
 from magcomp.cli.linking import LinkOptions, StatusLine, stop_on_interrupt
 from magcomp.cli.output import answer
-from magcomp.cli.work import present_parameters
 from magcomp.errors import AddressError, ExitCode
 from magcomp.link import Replay, parse_address
 from magcomp.live.heading import LiveHeading, Sensors, corrections, live_headings
@@ -78,7 +77,7 @@ def follow(address: str, link: LinkOptions, wanted: Following) -> ExitCode:
     ):
         vehicle = session.wait_ready(link.timeout)
         recording = _placed(session, stop)
-        shown, present = corrections(present_parameters(recording), wanted.chosen, wanted.compass)
+        shown, present = corrections(recording, wanted.chosen, wanted.compass)
         declination = expected_earth(recording).declination if has_position(recording) else 0.0
         session.listen(sensors)
         status, begun = StatusLine(terminal=False), session.elapsed_s

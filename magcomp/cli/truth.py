@@ -6,18 +6,17 @@ For demonstrations: nothing here is ever seen by a fit.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from magcomp.autopilots import ardupilot
 from magcomp.earth import expected_field
 from magcomp.errors import InputError
 from magcomp.geometry import body_from_earth
 from magcomp.judge import largest_shift
 from magcomp.judge.heading_error import attitudes
+from magcomp.model import Correction, symmetric
 
 
 class KnownTruth:
@@ -35,7 +34,7 @@ class KnownTruth:
             self._interference = np.array(document["mot_mgauss_per_amp"], float)
             self._home = tuple(float(part) for part in document["home"])
             self._compasses = [
-                (np.array(c["ofs"], float), ardupilot.soft_iron_matrix(c["dia"], c["odi"]))
+                (np.array(c["ofs"], float), symmetric(np.array([*c["dia"], *c["odi"]], float)))
                 for c in document["compass"]
             ]
         except (OSError, ValueError, KeyError, TypeError) as error:
@@ -44,14 +43,14 @@ class KnownTruth:
             ) from error
 
     def heading_error_deg(
-        self, parameters: Mapping[str, float], compass: int, amperes: float, unix_s: float
+        self, in_force: Correction, compass: int, amperes: float, unix_s: float
     ) -> float:
         """Largest heading error over all yaws, level and tilted by 20°, degrees.
 
         Parameters
         ----------
-        parameters
-            Names and values as they would be in the autopilot, compensating by current.
+        in_force
+            What the autopilot does, compensating by current.
         compass
             1, 2 or 3.
         amperes
@@ -62,7 +61,7 @@ class KnownTruth:
         Notes
         -----
         The sensor reads D⁻¹ · (field + interference · amperes) − OFS with the true D and OFS
-        (PAPER.md equation 3); the autopilot makes of it what AUTOPILOTS.md says.
+        (PAPER.md equation 3).
         """
         latitude, longitude, altitude = self._home
         earth = expected_field(latitude, longitude, altitude, unix_s)
@@ -72,6 +71,5 @@ class KnownTruth:
         )
         offset, soft_iron = self._compasses[compass - 1]
         raw = (field + amperes * self._interference) @ np.linalg.inv(soft_iron).T - offset
-        in_force = ardupilot.calibration(parameters, compass)
-        corrected = ardupilot.correct(raw, np.full(len(raw), amperes), in_force)
+        corrected = in_force.apply(raw, np.full(len(raw), amperes))
         return largest_shift(corrected, field, roll, pitch)

@@ -39,9 +39,3 @@ def check_log(
 
 def _read(log: Path, selection: Selection, progress: Callable[[float], None]) -> Recording:
     return read(log, system=selection.system, component=selection.component, progress=progress)
-
-
-def present_parameters(recording: Recording) -> dict[str, float]:
-    """Every parameter as the recording left it."""
-    history = recording.parameters
-    return {name: history.last(name, 0.0) for name in history.names}

@@ -8,7 +8,6 @@ from magcomp.compensate.equations import (
     shift_per_size,
 )
 from magcomp.compensate.fusion import Fusion, Heading, Motion, Reading, Tuning, fuse
-from magcomp.compensate.parameters import from_parameters
 from magcomp.compensate.track import Gravity, Track, events, track
 
 __all__ = [
@@ -22,7 +21,6 @@ __all__ = [
     "Tuning",
     "disturbance",
     "events",
-    "from_parameters",
     "fuse",
     "level_components",
     "level_heading_shift",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from magcomp import autopilots
 from magcomp.link.quality import LinkStatistics
 from magcomp.mavlink.heartbeat import Identity
 
@@ -60,6 +61,6 @@ def why_no_vehicle(
         )
     names = sorted(foreign, key=lambda name: -foreign[name])[:_NAMES_SHOWN]
     return start + (
-        f"{statistics.frames} frames arrived, but none from an ArduPilot or PX4 autopilot "
+        f"{statistics.frames} frames arrived, but none from an {autopilots.TITLES} autopilot "
         f"(only {', '.join(names)})."
     )

@@ -6,12 +6,13 @@ import re
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from magcomp import autopilots
 from magcomp.link.framing import Message
 from magcomp.mavlink.header import payload
 from magcomp.mavlink.heartbeat import Identity, identify
 from magcomp.mavlink.parameters import decode_param_value, encoding
+from magcomp.mavlink.version import firmware_version, unique_id
 from magcomp.model import Vehicle
-from magcomp.sources.quantities import DEVICE_ID_NAMES
 
 _BANNER = re.compile(r"\bV(\d+\.\d+\.\d+)")
 _RETRY_S = 0.4
@@ -36,6 +37,7 @@ class Identification:
         self._heartbeat = heartbeat
         self._firmware = ""
         self._board = ""
+        self._uid = ""
         self._version_known = False
         self._capabilities = 0
         self._device_ids: dict[str, bytes] = {}
@@ -45,19 +47,21 @@ class Identification:
     @property
     def vehicle(self) -> Vehicle:
         """Everything known so far."""
-        names = DEVICE_ID_NAMES[self._heartbeat.autopilot]
         how = encoding(self._heartbeat.autopilot, self._capabilities)
-        sent = (self._device_ids[name] for name in names if name in self._device_ids)
-        ids = (_whole(decode_param_value(each, how).value) for each in sent)
+        values = {
+            name: _whole(decode_param_value(sent, how).value)
+            for name, sent in self._device_ids.items()
+        }
         return Vehicle(
             autopilot=self._heartbeat.autopilot,
             kind=self._heartbeat.kind,
             system=self._heartbeat.system,
             component=self._heartbeat.component,
             firmware=self._firmware,
-            device_ids=tuple(number for number in ids if number),
+            compasses=autopilots.named(self._heartbeat.autopilot).compasses(values),
             board=self._board,
             capabilities=self._capabilities,
+            uid=self._uid,
         )
 
     def complete(self, now: float) -> bool:
@@ -73,6 +77,7 @@ class Identification:
             self._version_known = True
             self._capabilities = message.capabilities
             self._firmware = firmware_version(message.flight_sw_version) or self._firmware
+            self._uid = unique_id(bytes(message.uid2), message.uid)
             # ArduPilot: APJ board id in the upper half.
             self._board = f"board {message.board_version >> 16}" if message.board_version else ""
         elif kind == "STATUSTEXT" and not self._firmware:
@@ -104,7 +109,7 @@ class Identification:
         return questions
 
     def _known_names(self) -> tuple[str, ...]:
-        return DEVICE_ID_NAMES[self._heartbeat.autopilot]
+        return autopilots.named(self._heartbeat.autopilot).device_id_names
 
     def _missing_ids(self) -> list[str]:
         return [name for name in self._known_names() if name not in self._device_ids]
@@ -114,13 +119,6 @@ def command(to: tuple[int, int], number: int, *parameters: float) -> Message:
     """Make a COMMAND_LONG; parameters left out are 0."""
     padded = (*parameters, *(0.0,) * (7 - len(parameters)))
     return mavlink.MAVLink_command_long_message(*to, number, 0, *padded)
-
-
-def firmware_version(packed: int) -> str:
-    """Unpack AUTOPILOT_VERSION.flight_sw_version: major, minor, patch, type; a byte each."""
-    if not packed:
-        return ""
-    return f"{packed >> 24 & 255}.{packed >> 16 & 255}.{packed >> 8 & 255}"
 
 
 def _whole(value: float) -> int:

@@ -9,12 +9,13 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from magcomp.compensate import Compensator, Fusion, Motion, Reading, from_parameters, fuse
+from magcomp import autopilots
+from magcomp.compensate import Compensator, Fusion, Motion, Reading, fuse
 from magcomp.fit.flight import LAG_MEAN_S
 from magcomp.geometry import gravity_direction
 from magcomp.mavlink.header import message_id, source
 from magcomp.mavlink.messages import Message, decode_frame
-from magcomp.model import CURRENT, InForce, Vehicle
+from magcomp.model import CURRENT, InForce, Recording, Vehicle
 
 _FIELD_MESSAGES = {1: Message.RAW_IMU, 2: Message.SCALED_IMU2, 3: Message.SCALED_IMU3}
 _USED = frozenset((Message.RAW_IMU, Message.ATTITUDE, Message.VFR_HUD, Message.BATTERY_STATUS))
@@ -169,20 +170,24 @@ def live_headings(
 
 
 def corrections(
-    present: Mapping[str, float], chosen: Mapping[str, float], compass: int
+    recording: Recording, chosen: Mapping[str, float], compass: int
 ) -> tuple[InForce, InForce]:
     """The correction to show and the one in force.
 
     Parameters
     ----------
-    present
-        What the vehicle holds.
+    recording
+        Of the vehicle; its last parameters are in force.
     chosen
         Values to be taken instead; empty for the correction in force.
     compass
         1, 2 or 3.
     """
-    return from_parameters({**present, **chosen}, compass), from_parameters(present, compass)
+    autopilot, present = autopilots.of(recording), recording.parameters.latest
+    return (
+        autopilot.in_force({**present, **chosen}, compass),
+        autopilot.in_force(present, compass),
+    )
 
 
 def _seconds(content: Any) -> float:

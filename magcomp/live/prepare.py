@@ -6,20 +6,14 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 
+from magcomp import autopilots
 from magcomp.errors import LinkTimeoutError, MagcompError
 from magcomp.link import Connection, Replay
 from magcomp.link.clock import Clock
-from magcomp.model import ParameterSet, Vehicle
-from magcomp.writing.plan import relevant_names
+from magcomp.model import Vehicle
 from magcomp.writing.writer import fetch
 
 _STREAMS_S = 6.0
-_MOTOR_NAMES = (
-    *(f"MOT_{name}" for name in ("THST_EXPO", "SPIN_MIN", "SPIN_MAX", "PWM_MIN", "PWM_MAX")),
-    *("COMPASS_LEARN", "COMPASS_USE", "COMPASS_USE2", "COMPASS_USE3", "BATT_MONITOR"),
-)
-_OUTPUT_NAMES = tuple(f"SERVO{n}_FUNCTION" for n in range(1, 9))
-"""Nice to know, and not there on small boards: asking in vain takes seconds."""
 
 
 class Preparation:
@@ -80,12 +74,12 @@ class Preparation:
             if vehicle is not None and asks:
                 self._connection.request_streams(self._rates, _STREAMS_S)
                 self.streaming_since = self._clock.monotonic()
-                names = relevant_names(vehicle.autopilot, ParameterSet({}))
-                self._read(vehicle, (*names, *_MOTOR_NAMES))
+                autopilot = autopilots.of(vehicle)
+                self._read(vehicle, (*autopilot.relevant_names(), *autopilot.useful_names()))
             then()
             self.over.set()
             if vehicle is not None and asks:
-                self._read(vehicle, _OUTPUT_NAMES)
+                self._read(vehicle, autopilots.of(vehicle).output_names())
         except MagcompError as error:
             if not self.over.is_set():
                 self.failure = error

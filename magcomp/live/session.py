@@ -237,7 +237,7 @@ class LiveSession:
             recording=self._tap.taking and not self._tap.failure,
             recording_trouble=self._tap.failure,
             link=link,
-            compasses=compasses_now(now, parameters, refit),
+            compasses=compasses_now(now, vehicle, parameters, refit),
             throttle=now.throttle,
             current=now.current,
             voltage=now.voltage,

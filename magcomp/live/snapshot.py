@@ -9,14 +9,15 @@ from pathlib import Path
 
 import numpy as np
 
-from magcomp.autopilots import ardupilot
+from magcomp import autopilots
+from magcomp.autopilots import Autopilot
 from magcomp.buffer import Coverage
 from magcomp.geometry import heading
 from magcomp.link import LinkStatistics
 from magcomp.live.guide import Guidance, Situation
 from magcomp.live.latest import Now, Vector
 from magcomp.live.refit import Refit
-from magcomp.model import THROTTLE, Analysis, Grade, MotorFit, Vehicle
+from magcomp.model import THROTTLE, Analysis, Grade, InForce, MotorFit, Vehicle
 
 _PLAUSIBLE = (150.0, 900.0)
 """mGauss: the earth's field is 220 … 670; motors and a bad calibration add to it."""
@@ -144,27 +145,33 @@ class LiveSnapshot:
 
 
 def compasses_now(
-    now: Now, parameters: Mapping[str, float], refit: Refit
+    now: Now, vehicle: Vehicle | None, parameters: Mapping[str, float], refit: Refit
 ) -> tuple[CompassNow, ...]:
     """Work out each compass's heading, as it is and as it would be with the newest correction."""
     results = refit.analysis.compasses if refit.analysis else ()
     grades = {result.fit.compass: result.verdict.grade for result in results}
-    return tuple(
-        _compass_now(number, field, now, parameters, refit.fresh.get(number), grades.get(number))
-        for number, field in sorted(now.fields.items())
-    )
+    autopilot = None if vehicle is None else autopilots.of(vehicle)
+    found = []
+    for number, field in sorted(now.fields.items()):
+        fit, present = refit.fresh.get(number), None
+        if fit is not None and autopilot is not None:
+            present = autopilot.in_force(parameters, number)
+        found.append(_compass_now(number, field, now, present, fit, grades.get(number)))
+    return tuple(found)
 
 
 def _compass_now(
     number: int,
     field: Vector,
     now: Now,
-    parameters: Mapping[str, float],
+    present: InForce | None,
     fit: MotorFit | None,
     grade: Grade | None,
 ) -> CompassNow:
     strength = math.hypot(*field)
-    corrected = None if fit is None else _corrected(field, now, parameters, fit)
+    corrected = None
+    if fit is not None and present is not None:
+        corrected = _corrected(field, now, present, fit)
     return CompassNow(
         number=number,
         field=field,
@@ -176,18 +183,14 @@ def _compass_now(
     )
 
 
-def _corrected(
-    field: Vector, now: Now, parameters: Mapping[str, float], fit: MotorFit
-) -> Vector | None:
+def _corrected(field: Vector, now: Now, present: InForce, fit: MotorFit) -> Vector | None:
     """Undo the correction in force and apply the fitted one."""
-    present = ardupilot.calibration(parameters, fit.compass)
-    by_throttle = present.compensation is ardupilot.MotorCompensation.THROTTLE
-    u_present = now.throttle if by_throttle else now.current
+    u_present = now.throttle if present.regressor == THROTTLE else now.current
     u_new = now.throttle if fit.regressor == THROTTLE else now.current
-    if u_new is None or (u_present is None and present.motor.any()):
+    if u_new is None or (u_present is None and present.correction.motor.any()):
         return None
-    raw = ardupilot.uncorrect(np.array(field), np.array(u_present or 0.0), present)
-    x, y, z = fit.correction.apply(raw[None, :], np.array([u_new]))[0].tolist()
+    raw = present.correction.undo(np.array([field]), np.array([u_present or 0.0]))
+    x, y, z = fit.correction.apply(raw, np.array([u_new]))[0].tolist()
     return x, y, z
 
 
@@ -208,33 +211,23 @@ def warnings(
     streaming_s
         Seconds since the streams were asked for; what has not come early on may still come.
     """
-    if parameters.get("COMPASS_PMOT_EN"):
-        yield (
-            "COMPASS_PMOT_EN is on: compass 1 is corrected per motor and is left out; "
-            "set it to 0 to calibrate compass 1"
-        )
-    yield from _on_compasses(now, vehicle, parameters, streaming_s)
+    autopilot = autopilots.of(vehicle)
+    yield from autopilot.warnings(parameters)
+    yield from _on_compasses(now, vehicle, autopilot, streaming_s)
     if streaming_s > 3.0 and now.current is None:
         yield "there is no current sensor: throttle is used, which changes with the battery"
-    kind = ardupilot.calibration(parameters, 1).compensation
-    if kind is not ardupilot.MotorCompensation.OFF:
-        name = "throttle" if kind is ardupilot.MotorCompensation.THROTTLE else "current"
+    if (regressor := autopilot.regressor(parameters)) is not None:
         yield (
-            f"a motor compensation by {name} is in force (COMPASS_MOTCT {kind.value}): it is "
-            "taken into account"
-        )
-    if parameters.get("COMPASS_LEARN"):
-        yield (
-            f"COMPASS_LEARN is {parameters['COMPASS_LEARN']:.0f}: the offsets may move while this "
-            "is recorded; set it to 0"
+            f"a motor compensation by {regressor} is in force ({autopilot.switch} "
+            f"{parameters[autopilot.switch]:g}): it is taken into account"
         )
 
 
 def _on_compasses(
-    now: Now, vehicle: Vehicle, parameters: Mapping[str, float], streaming_s: float
+    now: Now, vehicle: Vehicle, autopilot: Autopilot, streaming_s: float
 ) -> Iterator[str]:
     if streaming_s > 3.0 and not now.fields:
-        yield "no compass reports: is COMPASS_ENABLE 1, and does the link carry RAW_IMU?"
+        yield f"no compass reports: {autopilot.no_compass_hint()}"
     elif streaming_s > 3.0 and len(now.fields) < len(vehicle.device_ids):
         missing = [n for n in range(1, len(vehicle.device_ids) + 1) if n not in now.fields]
         yield f"{_compasses(missing)} of {len(vehicle.device_ids)} does not report"
@@ -247,8 +240,6 @@ def _on_compasses(
                 f"compass {number} reads {strength:.0f} mGauss: the earth's field is "
                 "between 220 and 670"
             )
-        if parameters.get(f"COMPASS_USE{ardupilot.suffix(number)}", 1.0) == 0.0:
-            yield f"compass {number} is not used for the heading (COMPASS_USE is 0)"
 
 
 def _compasses(numbers: list[int]) -> str:

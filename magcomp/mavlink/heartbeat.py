@@ -11,10 +11,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from magcomp import autopilots
+
 AUTOPILOT_COMPONENT = 1
 """MAV_COMP_ID_AUTOPILOT1."""
 
-AUTOPILOTS = {3: "ardupilot", 12: "px4"}
+AUTOPILOTS = {autopilot.mavlink_number: autopilot.key for autopilot in autopilots.ALL}
 """The autopilots magcomp knows, by HEARTBEAT.autopilot."""
 
 KINDS = (
@@ -37,7 +39,7 @@ class Identity:
     system, component
         Its MAVLink address.
     autopilot
-        ``"ardupilot"`` or ``"px4"``.
+        As in :class:`magcomp.model.Vehicle`.
     kind
         As in :class:`magcomp.model.Vehicle`.
     """

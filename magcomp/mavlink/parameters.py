@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from magcomp import autopilots
 from magcomp.mavlink.messages import Message, decode_payload, text
 
 REAL32 = 9
@@ -70,7 +71,7 @@ def encoding(autopilot: str, capabilities: int = 0) -> Encoding:
     Parameters
     ----------
     autopilot
-        ``"ardupilot"`` or ``"px4"``.
+        As in ``Vehicle.autopilot``.
     capabilities
         AUTOPILOT_VERSION.capabilities; 0 where it was not heard.
     """
@@ -79,7 +80,8 @@ def encoding(autopilot: str, capabilities: int = 0) -> Encoding:
         return Encoding.BYTEWISE
     if says == _CAPABLE_OF_CAST:
         return Encoding.CAST
-    return Encoding.BYTEWISE if autopilot == "px4" else Encoding.CAST
+    bytewise = autopilots.named(autopilot).integers_as_bytes
+    return Encoding.BYTEWISE if bytewise else Encoding.CAST
 
 
 def decode_values(field: NDArray[Any], types: NDArray[Any], how: Encoding) -> NDArray[np.float64]:

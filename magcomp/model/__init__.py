@@ -26,6 +26,7 @@ from magcomp.model.parameters import ParameterSet
 from magcomp.model.recording import (
     Applied,
     BoolArray,
+    Compass,
     FloatArray,
     IntArray,
     ParameterChange,
@@ -34,6 +35,7 @@ from magcomp.model.recording import (
     Recording,
     Series,
     Vehicle,
+    compasses_of,
 )
 from magcomp.model.samples import (
     CURRENT,
@@ -58,6 +60,7 @@ __all__ = [
     "Analysis",
     "Applied",
     "BoolArray",
+    "Compass",
     "CompassResult",
     "Control",
     "Correction",
@@ -82,6 +85,7 @@ __all__ = [
     "Series",
     "Vehicle",
     "Verdict",
+    "compasses_of",
     "pack",
     "symmetric",
     "unpack",

@@ -281,6 +281,9 @@ class CompassResult:
         Exactly what would be written.
     insisted
         What would be written if the user insists on a rejected fit.
+    left_out
+        What would be written for this compass if its fit is not, though another compass's is: one
+        switch may serve all compasses.
     """
 
     fit: MotorFit
@@ -288,6 +291,7 @@ class CompassResult:
     in_force: Correction
     parameters: Mapping[str, float]
     insisted: Mapping[str, float] = field(default_factory=dict)
+    left_out: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

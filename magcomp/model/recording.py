@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from bisect import bisect_right
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from operator import attrgetter
 from typing import NamedTuple
@@ -41,6 +41,36 @@ class Series:
 
 
 @dataclass(frozen=True)
+class Compass:
+    """A compass of a vehicle, as its parameters describe it.
+
+    Attributes
+    ----------
+    slot
+        Its number 1, 2, … in ``Recording.field`` and in the parameters' names.
+    device_id
+        Bus, address and kind of sensor in one number; 0 where unknown.
+    external
+        Whether it stands away from the flight controller; None where unknown.
+    orientation
+        How an external one is turned against the vehicle (MAV_SENSOR_ROTATION); None where unknown.
+    used
+        Whether the vehicle takes its heading from it; None where unknown.
+    """
+
+    slot: int
+    device_id: int = 0
+    external: bool | None = None
+    orientation: int | None = None
+    used: bool | None = None
+
+
+def compasses_of(device_ids: Iterable[int]) -> tuple[Compass, ...]:
+    """Compasses of which only the ids are known, in slots 1, 2, … without gap."""
+    return tuple(Compass(slot, device_id) for slot, device_id in enumerate(device_ids, start=1))
+
+
+@dataclass(frozen=True)
 class Vehicle:
     """Who made the recording.
 
@@ -54,12 +84,15 @@ class Vehicle:
         MAVLink identity of the autopilot.
     firmware
         Version such as ``"4.6.3"``; empty where the recording does not say.
-    device_ids
-        Of its compasses, in the order of their parameters, as far as known and not 0.
+    compasses
+        Its compasses in the order of their slots, as far as known.
     board
         Flight controller, as far as a live vehicle names it; empty where unknown.
     capabilities
         AUTOPILOT_VERSION.capabilities, which say how its parameters travel; 0 where unknown.
+    uid
+        The flight controller's own number (AUTOPILOT_VERSION.uid2, else uid), in hexadecimal;
+        empty where unknown.
     """
 
     autopilot: str
@@ -67,9 +100,15 @@ class Vehicle:
     system: int
     component: int
     firmware: str = ""
-    device_ids: tuple[int, ...] = ()
+    compasses: tuple[Compass, ...] = ()
     board: str = ""
     capabilities: int = 0
+    uid: str = ""
+
+    @property
+    def device_ids(self) -> tuple[int, ...]:
+        """Ids of the compasses in the order of their slots, without those unknown."""
+        return tuple(compass.device_id for compass in self.compasses if compass.device_id)
 
 
 @dataclass(frozen=True)
@@ -123,9 +162,17 @@ class ParameterHistory:
 
     A value holds from its report until the next one; the first report of a
     name also holds before it, because ground stations ask for the list late.
+
+    Attributes
+    ----------
+    changes
+        Every report.
+    whole
+        Whether the vehicle's whole list is here, so that a name not in it does not exist.
     """
 
     changes: tuple[ParameterChange, ...] = ()
+    whole: bool = False
     _by_name: Mapping[str, tuple[ParameterChange, ...]] = dataclasses.field(
         init=False, repr=False, compare=False, default_factory=dict
     )
@@ -157,6 +204,11 @@ class ParameterHistory:
         """Value of ``name`` at the end of the recording."""
         changes = self.of(name)
         return changes[-1].value if changes else default
+
+    @property
+    def latest(self) -> dict[str, float]:
+        """Value of every name at the end of the recording."""
+        return {name: changes[-1].value for name, changes in self._by_name.items()}
 
 
 @dataclass(frozen=True, eq=False)

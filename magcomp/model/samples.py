@@ -37,6 +37,11 @@ class Correction:
         """Corrected field, mGauss, shape (n, 3); PAPER.md equation 6 with a moving centre."""
         return (raw + self.offset) @ self.soft_iron.T + np.multiply.outer(u, self.motor)
 
+    def undo(self, corrected: FloatArray, u: FloatArray) -> FloatArray:
+        """Sensor field, mGauss, shape (n, 3): the inverse of :meth:`apply`."""
+        linear = corrected - np.multiply.outer(u, self.motor)
+        return np.asarray(np.linalg.solve(self.soft_iron, linear.T).T - self.offset)
+
     def centre(self, u: float) -> FloatArray:
         """Centre of the raw ellipsoid at control quantity ``u``, mGauss, shape (3,)."""
         return -self.offset - np.linalg.solve(self.soft_iron, self.motor) * u
@@ -88,7 +93,8 @@ class InForce:
     regressor
         The control quantity ``correction.motor`` was multiplied by; None where it was off.
     unseen
-        Parameters that make the correction and that the recording does not tell.
+        Parameters that act on the readings and of which the recording does not tell the value;
+        the firmware's defaults stand for them.
     """
 
     correction: Correction
@@ -114,6 +120,14 @@ class Readings:
         What was in force, oldest first; the last is the present one.
     attitude
         Roll, pitch and yaw, radians, each unwrapped.
+    corrected
+        Whether what was in force is in ``reported``; False where the sensor's own field is.
+    applied_later
+        What is in force was multiplied by a control quantity this much older than what disturbed
+        the reading, seconds.
+    told_offset, told_motor
+        The offset and the motor correction of each reading as the log tells them, mGauss, shape
+        (n, 3); None where only the parameters tell. They stand for those of ``in_force``.
     """
 
     compass: int
@@ -122,6 +136,10 @@ class Readings:
     stretch: IntArray
     in_force: tuple[InForce, ...]
     attitude: Series
+    corrected: bool = True
+    applied_later: float = 0.05
+    told_offset: FloatArray | None = None
+    told_motor: FloatArray | None = None
 
     def __len__(self) -> int:
         return len(self.time)
@@ -129,7 +147,12 @@ class Readings:
     def where(self, keep: BoolArray) -> Readings:
         """The rows for which ``keep`` is true."""
         return replace(
-            self, time=self.time[keep], reported=self.reported[keep], stretch=self.stretch[keep]
+            self,
+            time=self.time[keep],
+            reported=self.reported[keep],
+            stretch=self.stretch[keep],
+            told_offset=None if self.told_offset is None else self.told_offset[keep],
+            told_motor=None if self.told_motor is None else self.told_motor[keep],
         )
 
 

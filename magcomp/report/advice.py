@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
+from magcomp import autopilots
 from magcomp.analysis import Options
 from magcomp.report import words
 
@@ -56,12 +57,13 @@ def steps(document: Document, options: Options | None = None) -> tuple[str, ...]
             *(_doubt(c, "") for c in document["compasses"]),
             "Mend what the verdict names, record again, and make a new report of the new log.",
         )
+    switch = autopilots.named(document["vehicle"]["autopilot"]).switch
     found = [_write(document, sorted(kept), options)]
     for compass in document["compasses"]:
         if compass["verdict"] == "marginal":
             found.append(_doubt(compass, "Until a better log says otherwise, fly with care"))
         elif compass["verdict"] == "rejected":
-            found.append(_doubt(compass, _left(compass)))
+            found.append(_doubt(compass, _left(compass, switch)))
     found.append(
         "Fly once more, gently, and run `magcomp check` on the new log: the heading error it "
         "finds should be what this report promises."
@@ -89,11 +91,11 @@ def _command(source: str, options: Options | None) -> str:
     return " ".join(["magcomp fit", shlex.quote(source), *given, "-o compass.param"])
 
 
-def _left(compass: Mapping[str, Any]) -> str:
+def _left(compass: Mapping[str, Any], switch: str) -> str:
     if compass["parameters"]:
         return (
             "It gets no correction: its motor vector must be zero, because one switch, "
-            "COMPASS_MOTCT, serves all compasses"
+            f"{switch}, serves all compasses"
         )
     return "It is left as it is"
 

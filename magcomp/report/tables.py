@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from rich.table import Table
 from rich.text import Text
 
+from magcomp import autopilots
+from magcomp.autopilots import Kind
 from magcomp.model import CURRENT, CompassResult, MotorFit, Verdict
 from magcomp.report import words
 
-_KINDS = ("COMPASS_MOTCT", "COMPASS_MOT", "COMPASS_OFS", "COMPASS_DIA", "COMPASS_ODI")
-_VECTOR = re.compile(r"(COMPASS_[A-Z]+[23]?)_([XYZ])")
+_DECIMALS = {Kind.OFFSET: 2, Kind.DIAGONAL: 4, Kind.OFF_DIAGONAL: 4}
 
 
 class _Columns:
@@ -118,15 +118,13 @@ def parameters(
 def _vectors(values: Mapping[str, float]) -> dict[str, list[str]]:
     """Names of parameters by vector: the switch, then motor, offset and soft iron by compass."""
     found: dict[str, list[str]] = {}
+    place: dict[str, tuple[float, str]] = {}
     for name in values:
-        match = _VECTOR.fullmatch(name)
-        found.setdefault(match[1] if match else name, []).append(name)
-
-    def place(vector: str) -> tuple[int, str]:
-        kind = vector.rstrip("23")
-        return (_KINDS.index(kind) if kind in _KINDS else len(_KINDS), vector)
-
-    return {vector: found[vector] for vector in sorted(found, key=place)}
+        parsed = autopilots.parse(name)
+        vector = name if parsed is None else parsed.vector
+        found.setdefault(vector, []).append(name)
+        place[vector] = (math.inf if parsed is None else parsed.kind, vector)
+    return {vector: found[vector] for vector in sorted(found, key=place.__getitem__)}
 
 
 def _same(new: float, old: float) -> bool:
@@ -134,7 +132,8 @@ def _same(new: float, old: float) -> bool:
 
 
 def _change(name: str, new: float, old: float) -> Text:
-    decimals = 2 if "_OFS" in name else 4 if "_DIA" in name or "_ODI" in name else 3
+    parsed = autopilots.parse(name)
+    decimals = 3 if parsed is None else _DECIMALS.get(parsed.kind, 3)
     if _same(new, old):
         return Text(words.number(new, decimals), style="dim")
     text = Text()

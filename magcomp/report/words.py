@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from magcomp import autopilots
 from magcomp.model import CURRENT, Vehicle
 
 _MOST_DECIMALS = 3
-_AUTOPILOTS = {"ardupilot": "ArduPilot", "px4": "PX4"}
 
 
 def quantity(u: float, regressor: str) -> str:
@@ -76,7 +76,7 @@ def compasses(numbers: Sequence[int]) -> str:
 def vehicle(of: Vehicle) -> str:
     """``ArduPilot copter 4.6.3, system 1``."""
     known = "" if of.kind == "unknown" else of.kind
-    words = [_AUTOPILOTS.get(of.autopilot, of.autopilot), known, of.firmware]
+    words = [autopilots.title(of.autopilot), known, of.firmware]
     return f"{' '.join(filter(None, words))}, system {of.system}"
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from magcomp import autopilots
 from magcomp.errors import LogError
 from magcomp.mavlink.checksum import ByteArray, OffsetArray
 from magcomp.mavlink.frames import Frames, Scan, scan
@@ -162,7 +163,7 @@ def decode_vehicle(
 def _recording(decoded: Decoded, source: str, kind: str) -> Recording:
     messages, who = decoded.messages, decoded.who
     changes = quantities.parameters(messages, who.autopilot, simulation=False)
-    parameters = ParameterHistory(tuple(changes))
+    parameters = ParameterHistory(tuple(changes), quantities.holds_whole_list(messages))
     heartbeats = messages[Message.HEARTBEAT]
     return Recording(
         source=source,
@@ -172,8 +173,9 @@ def _recording(decoded: Decoded, source: str, kind: str) -> Recording:
             system=who.system,
             component=who.component,
             firmware=quantities.firmware(messages),
-            device_ids=quantities.device_ids(parameters, who.autopilot),
+            compasses=autopilots.named(who.autopilot).compasses(parameters.latest),
             capabilities=quantities.capabilities(messages),
+            uid=quantities.uid(messages),
         ),
         start_unix_s=decoded.start_unix_s,
         duration_s=decoded.duration_s,

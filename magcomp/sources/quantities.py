@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from magcomp.mavlink.heartbeat import is_armed
 from magcomp.mavlink.messages import Message, Table, text
 from magcomp.mavlink.parameters import decode_values, encoding
-from magcomp.model import FloatArray, ParameterChange, ParameterHistory, Series
+from magcomp.mavlink.version import firmware_version, unique_id
+from magcomp.model import FloatArray, ParameterChange, Series
 
 STANDARD_GRAVITY = 9.80665
 OUTPUTS = 16
@@ -162,7 +163,7 @@ def parameters(messages: Messages, autopilot: str, simulation: bool) -> list[Par
     messages
         One vehicle's messages.
     autopilot
-        ``"ardupilot"`` or ``"px4"``.
+        As in ``Vehicle.autopilot``.
     simulation
         True for the SIM_* parameters alone, False for all others.
     """
@@ -180,6 +181,19 @@ def parameters(messages: Messages, autopilot: str, simulation: bool) -> list[Par
     ]
 
 
+def holds_whole_list(messages: Messages) -> bool:
+    """Whether every place of the vehicle's parameter list was reported."""
+    if Message.PARAM_VALUE not in messages:
+        return False
+    table = messages[Message.PARAM_VALUE].table
+    listed = table[table["param_index"] < table["param_count"]]
+    if not len(listed):
+        return False
+    count = listed["param_count"][-1]
+    places = np.unique(listed["param_index"][listed["param_count"] == count])
+    return len(places) == int(count)
+
+
 def capabilities(messages: Messages) -> int:
     """AUTOPILOT_VERSION.capabilities as last reported; 0 where it was not."""
     if Message.AUTOPILOT_VERSION not in messages:
@@ -187,31 +201,26 @@ def capabilities(messages: Messages) -> int:
     return int(messages[Message.AUTOPILOT_VERSION].table["capabilities"][-1])
 
 
+def uid(messages: Messages) -> str:
+    """The flight controller's own number in hexadecimal; empty where it was not reported."""
+    if Message.AUTOPILOT_VERSION not in messages:
+        return ""
+    row = messages[Message.AUTOPILOT_VERSION].table[-1]
+    return unique_id(row["uid2"].tobytes(), int(row["uid"]))
+
+
 def firmware(messages: Messages) -> str:
     """Version such as "4.6.3" as last reported; empty where it was not."""
     if Message.AUTOPILOT_VERSION in messages:
-        version = int(messages[Message.AUTOPILOT_VERSION].table["flight_sw_version"][-1])
-        if version:
-            return f"{version >> 24}.{version >> 16 & 0xFF}.{version >> 8 & 0xFF}"
+        packed = messages[Message.AUTOPILOT_VERSION].table["flight_sw_version"][-1]
+        if version := firmware_version(int(packed)):
+            return version
     if Message.STATUSTEXT in messages:
         for line in reversed(text(messages[Message.STATUSTEXT].table["text"])):
             banner = _BANNER.match(line)
             if banner:
                 return banner.group(1)
     return ""
-
-
-DEVICE_ID_NAMES = {
-    "ardupilot": ("COMPASS_DEV_ID", "COMPASS_DEV_ID2", "COMPASS_DEV_ID3"),
-    "px4": ("CAL_MAG0_ID", "CAL_MAG1_ID", "CAL_MAG2_ID"),
-}
-"""Parameters that tell which compasses a vehicle has, by autopilot."""
-
-
-def device_ids(parameters: ParameterHistory, autopilot: str) -> tuple[int, ...]:
-    """The compasses' device ids as last reported, without those that are 0."""
-    values = (parameters.last(name, 0.0) for name in DEVICE_ID_NAMES[autopilot])
-    return tuple(int(value) for value in values if np.isfinite(value) and value)
 
 
 def unix_offset(messages: Messages) -> float:

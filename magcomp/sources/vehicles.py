@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from magcomp import autopilots
 from magcomp.errors import ChooseVehicleError, LogError
 from magcomp.mavlink.frames import Frames
 from magcomp.mavlink.heartbeat import Identity, identify, vehicles
@@ -55,7 +56,7 @@ def choose(source: str, heartbeats: Frames, table: Table, choice: Choice) -> Ide
     heard = _identities(heartbeats, table)
     if not heard:
         raise LogError(
-            f"Log {source} must hold heartbeats of an ArduPilot or PX4 autopilot; "
+            f"Log {source} must hold heartbeats of an {autopilots.TITLES} autopilot; "
             f"instead received {_who(heartbeats)}."
         )
     found = vehicles(heard, None, choice.component)

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from magcomp.autopilots import ardupilot
+from magcomp import autopilots
 from magcomp.geometry import heading
 from magcomp.live.snapshot import CompassNow, LiveSnapshot
-from magcomp.model import THROTTLE, Analysis
+from magcomp.model import THROTTLE, Analysis, FloatArray, InForce
 from magcomp.tui.work import Work, Writing
 
 
@@ -122,7 +122,7 @@ def heading_pairs(live: LiveSnapshot, work: Work, writing: Writing) -> tuple[Hea
     Notes
     -----
     The vehicle reports with what is in force: before writing that is the old calibration, after
-    it the new one. The other one is found by undoing what is in force (AUTOPILOTS.md).
+    it the new one. The other one is found by undoing what is in force.
     """
     return tuple(_pair(compass, live, work, writing) for compass in live.compasses)
 
@@ -145,12 +145,14 @@ def _with(
     wanted: Mapping[str, float],
 ) -> float | None:
     """Heading with another calibration than the one in force."""
-    held, other = (ardupilot.calibration(values, now.number) for values in (in_force, wanted))
+    held, other = (_in_force(values, now, live) for values in (in_force, wanted))
+    if held is None or other is None:
+        return None
     u_held, u_other = _u(held, live), _u(other, live)
     if u_held is None or u_other is None:
         return None
-    raw = ardupilot.uncorrect(np.array(now.field), np.array(u_held), held)
-    return _heading(ardupilot.correct(raw, np.array(u_other), other), live)
+    raw = held.correction.undo(np.array([now.field]), np.array([u_held]))
+    return _heading(other.correction.apply(raw, np.array([u_other]))[0], live)
 
 
 def _with_fit(
@@ -158,28 +160,32 @@ def _with_fit(
 ) -> float | None:
     """Heading with a fit that is not written yet."""
     result = next((c for c in analysis.compasses if c.fit.compass == now.number), None)
-    held = ardupilot.calibration(in_force, now.number)
+    held = _in_force(in_force, now, live)
+    if result is None or held is None:
+        return None
     u_held = _u(held, live)
-    if result is None or u_held is None:
-        return None
     u = live.throttle if result.fit.regressor == THROTTLE else live.current
-    if u is None:
+    if u is None or u_held is None:
         return None
-    raw = ardupilot.uncorrect(np.array(now.field), np.array(u_held), held)
-    return _heading(result.fit.correction.apply(raw[None, :], np.array([u]))[0], live)
+    raw = held.correction.undo(np.array([now.field]), np.array([u_held]))
+    return _heading(result.fit.correction.apply(raw, np.array([u]))[0], live)
 
 
-def _u(calibration: ardupilot.Calibration, live: LiveSnapshot) -> float | None:
+def _in_force(values: Mapping[str, float], now: CompassNow, live: LiveSnapshot) -> InForce | None:
+    """What parameters do to a compass; None before the vehicle is known."""
+    if live.vehicle is None:
+        return None
+    return autopilots.of(live.vehicle).in_force(values, now.number)
+
+
+def _u(in_force: InForce, live: LiveSnapshot) -> float | None:
     """What the autopilot multiplies by; 0 where its compensation is off, None where not known."""
-    by = {
-        ardupilot.MotorCompensation.OFF: 0.0,
-        ardupilot.MotorCompensation.THROTTLE: live.throttle,
-        ardupilot.MotorCompensation.CURRENT: live.current,
-    }
-    return by[calibration.compensation]
+    if in_force.regressor is None:
+        return 0.0
+    return live.throttle if in_force.regressor == THROTTLE else live.current
 
 
-def _heading(field: ardupilot.FloatArray, live: LiveSnapshot) -> float | None:
+def _heading(field: FloatArray, live: LiveSnapshot) -> float | None:
     if live.attitude_deg is None:
         return None
     roll, pitch, _ = np.radians(live.attitude_deg)

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from magcomp.autopilots import ardupilot
+from magcomp import autopilots
+from magcomp.autopilots import Kind
 from magcomp.model import Analysis, ParameterSet
 from magcomp.report import words
 from magcomp.writing.events import (
@@ -84,28 +85,28 @@ def change_rows(present: Mapping[str, float], wanted: ParameterSet | None) -> tu
         for name, value in wanted.values.items()
         if name not in present or np.float32(present[name]) != np.float32(value)
     ]
-    return tuple(sorted(changed, key=lambda row: "MOT" not in row.name))
+    return tuple(sorted(changed, key=lambda row: not _is_of_motors(row.name)))
+
+
+def _is_of_motors(name: str) -> bool:
+    found = autopilots.parse(name)
+    return found is not None and found.kind in (Kind.SWITCH, Kind.MOTOR, Kind.PER_MOTOR)
 
 
 def left_out_warnings(
     analysis: Analysis, chosen: frozenset[int], present: Mapping[str, float]
 ) -> Iterator[str]:
-    """What happens to compasses that are not chosen: one switch serves all of them.
-
-    Notes
-    -----
-    COMPASS_MOTCT brings the stored vector of every compass into force (AUTOPILOTS.md).
-    """
+    """What happens to compasses that are not chosen: one switch serves all of them."""
     for result in analysis.compasses:
         compass = result.fit.compass
         if compass in chosen or not chosen:
             continue
-        stored = [present.get(name, 0.0) for name in ardupilot.vector_names("MOT", compass)]
+        stored = [present.get(name, 0.0) for name in result.left_out]
         if any(stored):
             vector = ", ".join(words.number(value) for value in stored)
             yield (
                 f"Compass {compass} is left out, but the switch serves all compasses: its stored "
-                f"vector ({vector}) will act."
+                f"vector ({vector}) would act, so it is set to 0."
             )
 
 

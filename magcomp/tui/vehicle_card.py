@@ -7,11 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from magcomp.autopilots import ardupilot
+from magcomp import autopilots
 from magcomp.model import Grade, Recording, Vehicle, Verdict
 from magcomp.report import words
-
-_SWITCH_WORDS = {0.0: "off", 1.0: "by throttle", 2.0: "by current"}
 
 
 @dataclass(frozen=True)
@@ -45,47 +43,47 @@ def card_of_recording(
     verdicts
         What the judge thinks of the calibration in force, by compass; None where not judged.
     """
-    parameters = {name: recording.parameters.last(name, 0.0) for name in recording.parameters.names}
+    parameters = recording.parameters.latest
     compasses = sorted(recording.field)
     facts = (
         ("Readings", f"{words.duration(recording.duration_s)}, {_quantities(recording)}"),
         ("Compasses", _compasses(compasses, recording.vehicle)),
-        *calibration_facts(parameters, compasses),
+        *calibration_facts(recording.vehicle, parameters, compasses),
         *(_in_force(compass, verdict) for compass, verdict in (verdicts or {}).items()),
     )
-    warnings = (*_lacking(recording), *parameter_warnings(parameters))
+    warnings = (*_lacking(recording), *parameter_warnings(recording.vehicle, parameters))
     return VehicleCard(words.vehicle(recording.vehicle), facts, warnings)
 
 
 def calibration_facts(
-    parameters: Mapping[str, float], compasses: list[int]
+    vehicle: Vehicle, parameters: Mapping[str, float], compasses: list[int]
 ) -> Iterator[tuple[str, str]]:
     """The calibration in force, a line a compass."""
     if not parameters:
         return
-    switch = parameters.get(ardupilot.COMPENSATION_SWITCH, 0.0)
-    yield "Compensation", f"{_SWITCH_WORDS.get(switch, 'unknown')} (COMPASS_MOTCT {switch:g})"
+    autopilot = autopilots.of(vehicle)
+    by = autopilot.regressor(parameters)
+    switch = parameters.get(autopilot.switch, 0.0)
+    yield "Compensation", f"{f'by {by}' if by else 'off'} ({autopilot.switch} {switch:g})"
     for compass in compasses:
-        held = ardupilot.calibration(parameters, compass)
+        held = autopilot.in_force(parameters, compass).correction
         offset = ", ".join(words.number(float(v), 0) for v in held.offset)
-        iron = "soft iron set" if held.has_soft_iron else "no soft iron"
+        iron = "no soft iron" if np.allclose(held.soft_iron, np.eye(3)) else "soft iron set"
         yield f"Compass {compass}", f"offsets {offset}; {iron}"
 
 
-def parameter_warnings(parameters: Mapping[str, float]) -> Iterator[str]:
+def parameter_warnings(vehicle: Vehicle, parameters: Mapping[str, float]) -> Iterator[str]:
     """What the parameters in force will do to a recording."""
     if not parameters:
         yield "The parameters are not known: only the motor vector can be given."
         return
-    if parameters.get(ardupilot.COMPENSATION_SWITCH, 0.0):
+    autopilot = autopilots.of(vehicle)
+    if autopilot.regressor(parameters) is not None:
         yield (
             "Motor compensation is on already: its effect is taken out of the readings before "
             "the fit."
         )
-    if parameters.get("COMPASS_PMOT_EN", 0.0):
-        yield "COMPASS_PMOT_EN is on: compass 1 is corrected per motor and cannot be fitted."
-    if parameters.get("COMPASS_LEARN", 0.0) == 3.0:
-        yield "COMPASS_LEARN is 3: offsets change in flight. Set it to 0 while you record."
+    yield from map(words.sentence, autopilot.warnings(parameters))
 
 
 def _compasses(compasses: list[int], vehicle: Vehicle) -> str:

@@ -63,18 +63,14 @@ class Work:
         """Every parameter of the vehicle as the recording left it."""
         if self.recording is None:
             return {}
-        history = self.recording.parameters
-        return {name: history.last(name, 0.0) for name in history.names}
+        return self.recording.parameters.latest
 
     @property
     def parameters(self) -> ParameterSet | None:
         """The parameters of the chosen compasses; None where there is nothing to write."""
         if self.analysis is None:
             return None
-        results = [c for c in self.analysis.compasses if c.fit.compass in self.chosen]
-        if not results:
-            return None
-        found = parameter_set(replace(self.analysis, compasses=tuple(results)))
+        found = parameter_set(self.analysis, compasses=self.chosen)
         return found if found.values else None
 
     def with_analysis(self, analysis: Analysis, pictures: Mapping[int, CompassPicture]) -> Work:

@@ -6,7 +6,7 @@ value and type; fields stand apart by comma, space or tab. Lines that begin
 with ``#`` before the first row are comments for people, except one, which
 says whose parameters these are::
 
-    # magcomp-vehicle: {"autopilot": "ardupilot", "kind": "copter", "system": 1, ...}
+    # magcomp-vehicle: {"autopilot": ..., "kind": "copter", "system": 1, ...}
 """
 
 from __future__ import annotations
@@ -15,32 +15,27 @@ import json
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 
+from magcomp import autopilots
 from magcomp.errors import OutputError, ParameterFileError, UsageError
 from magcomp.mavlink.parameters import REAL32
 from magcomp.model import ParameterSet, Vehicle
+from magcomp.writing.owner import document, vehicle_of
 
 SUFFIXES = (".param", ".parm", ".params")
 
 _LARGEST_FILE = 16 * 1024 * 1024
 _AUTOPILOT_COMPONENT = 1
-_INTEGER_TYPES = (
-    (re.compile(r"COMPASS_(MOTCT|PMOT_EN)"), 2),  # INT8
-    (re.compile(r"COMPASS_(DEV_ID[23]?|PRIO[123]_ID)|CAL_MAG(\d_ID|_COMP_TYP)"), 6),  # INT32
-)
 
 _NAME = re.compile(r"[A-Z0-9_]{1,16}", re.ASCII)
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _NOT_FINITE = re.compile(r"[+-]?(nan|inf|infinity)", re.IGNORECASE)
 _SEPARATOR = re.compile(r"[ \t]*,[ \t]*|[ \t]+")
 _NOT_TEXT = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")
-
-_T = TypeVar("_T")
 
 _VEHICLE_MARK = "magcomp-vehicle:"
 _QGC_TITLE = "Onboard parameters for Vehicle"
@@ -183,9 +178,8 @@ def format_parameters(parameters: ParameterSet, suffix: str) -> str:
         _rounded(value, name, "to be written")
     head = [_comment(line) for comment in parameters.comments for line in _comment_lines(comment)]
     if parameters.vehicle is not None:
-        named = asdict(parameters.vehicle)
-        del named["capabilities"]  # a live vehicle says them itself
-        head.append(_comment(f"{_VEHICLE_MARK} {json.dumps(named)}"))
+        named = json.dumps(document(parameters.vehicle))
+        head.append(_comment(f"{_VEHICLE_MARK} {named}"))
     return "".join(f"{line}\n" for line in (*head, *writer(parameters)))
 
 
@@ -342,27 +336,11 @@ def _named_system(row: _Row) -> str:
 
 def _parse_vehicle(text: str, where: str) -> Vehicle:
     try:
-        found = json.loads(text)
-        vehicle = Vehicle(
-            autopilot=_typed(found["autopilot"], str),
-            kind=_typed(found["kind"], str),
-            system=_typed(found["system"], int),
-            component=_typed(found["component"], int),
-            firmware=_typed(found["firmware"], str),
-            board=_typed(found.get("board", ""), str),
-            device_ids=tuple(_typed(device, int) for device in _typed(found["device_ids"], list)),
-        )
-    except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
+        return vehicle_of(text)
+    except ValueError as error:
         raise ParameterFileError(
             f"{where}: the vehicle must be as magcomp wrote it; instead received {_shown(text)}"
         ) from error
-    return vehicle
-
-
-def _typed(value: object, kind: type[_T]) -> _T:
-    if not isinstance(value, kind) or isinstance(value, bool):
-        raise TypeError(f"must be {kind.__name__}; instead received {value!r}")
-    return value
 
 
 def _shown(text: str) -> str:
@@ -398,7 +376,7 @@ def _qgroundcontrol(parameters: ParameterSet) -> Iterator[str]:
     yield f"# {_QGC_TITLE} {system}"
     yield f"# {_QGC_COLUMNS}"
     for name, value in parameters.values.items():
-        kind = next((kind for names, kind in _INTEGER_TYPES if names.fullmatch(name)), REAL32)
+        kind = autopilots.integer_type(name) or REAL32
         yield f"{system}\t{component}\t{name}\t{format_value(value)}\t{kind}"
 
 

@@ -21,6 +21,7 @@ from typing import Any, TextIO
 from magcomp.errors import OutputError, ParameterFileError
 from magcomp.writing.events import Event, Intends, Outcome, Progress, Reason, Stage, Standing
 from magcomp.writing.files import sync_directory
+from magcomp.writing.owner import document
 from magcomp.writing.plan import WritePlan
 
 _BEGIN = "Begin"
@@ -84,7 +85,7 @@ class Journal:
         begin = {
             "event": _BEGIN,
             "backup": backup.name,
-            "vehicle": asdict(plan.vehicle),
+            "vehicle": document(plan.vehicle),
             "changes": [asdict(change) for change in plan.changes],
         }
         self._write([begin], sync=True)

@@ -1,34 +1,21 @@
 """What a write will do: the difference between a vehicle and a parameter set.
 
-Motor compensation is switched by one parameter for all compasses
-(COMPASS_MOTCT; CAL_MAG_COMP_TYP on PX4), and by COMPASS_PMOT_EN for compass 1
-where per-motor compensation is built in. These are *switches*; offsets, soft
-iron and compensation vectors are *values*. Everything else in a parameter
-file is none of magcomp's business and is left out.
+Motor compensation is switched by one parameter for all compasses (and, where
+per-motor compensation is built in, by one of its own). These are *switches*;
+offsets, soft iron and compensation vectors are *values*. Everything else in a
+parameter file is none of magcomp's business and is left out.
 """
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
+from magcomp import autopilots
+from magcomp.autopilots import Kind
 from magcomp.errors import ParameterFileError, VehicleRefusedError, WriteError
-from magcomp.model import ParameterSet, Vehicle
+from magcomp.model import Compass, ParameterSet, Vehicle
 from magcomp.writing.files import as_float32, format_value
-
-_SWITCH = re.compile(r"COMPASS_MOTCT|COMPASS_PMOT_EN|CAL_MAG_COMP_TYP")
-_VALUE = re.compile(
-    r"COMPASS_(OFS|DIA|ODI|MOT)[23]?_[XYZ]|COMPASS_SCALE[23]?|COMPASS_PMOT(_EXP|[1-4]_[XYZ])"
-    r"|CAL_MAG[0-3]_[XYZ](OFF|SCALE|ODIAG|COMP)"
-)
-_DEVICE = re.compile(r"COMPASS_DEV_ID[23]?|CAL_MAG[0-3]_ID")
-_COMPASS = re.compile(r"COMPASS_|CAL_MAG")
-
-_OFFSETS_MAX = "COMPASS_OFFS_MAX"
-_OFFSETS_MAX_DEFAULT = 1800.0
-_SCALE_LIMIT = 1.5
-_CHOICES = {"COMPASS_MOTCT": (0, 1, 2), "COMPASS_PMOT_EN": (0, 1), "CAL_MAG_COMP_TYP": (0, 1, 2, 3)}
 
 
 @dataclass(frozen=True)
@@ -92,23 +79,12 @@ def relevant_names(autopilot: str, wanted: ParameterSet) -> tuple[str, ...]:
     Parameters
     ----------
     autopilot
-        ``"ardupilot"`` or ``"px4"``.
+        As in ``Vehicle.autopilot``.
     wanted
         What shall be written; its compass parameters are asked for as well.
     """
-    axes = "XYZ"
-    if autopilot == "px4":
-        kinds = ("OFF", "SCALE", "ODIAG", "COMP")
-        names = ["CAL_MAG_COMP_TYP", *(f"CAL_MAG{n}_ID" for n in range(4))]
-        names += [f"CAL_MAG{n}_{a}{kind}" for n in range(4) for kind in kinds for a in axes]
-    else:
-        numbers = ("", "2", "3")
-        names = ["COMPASS_MOTCT", "COMPASS_PMOT_EN", _OFFSETS_MAX]
-        names += [f"COMPASS_{kind}{n}" for n in numbers for kind in ("DEV_ID", "SCALE")]
-        kinds = ("OFS", "DIA", "ODI", "MOT")
-        names += [f"COMPASS_{kind}{n}_{a}" for n in numbers for kind in kinds for a in axes]
-    names += [name for name in wanted.values if _COMPASS.match(name)]
-    return tuple(dict.fromkeys(names))
+    names = autopilots.named(autopilot).relevant_names()
+    return tuple(dict.fromkeys((*names, *filter(_is_of_compass, wanted.values))))
 
 
 def plan(
@@ -143,10 +119,12 @@ def plan(
         float32, or a switch has no such position.
     """
     held = _held(current)
-    identity = {name: value for name, value in current.items() if _DEVICE.fullmatch(name)}
-    vehicle = _with_devices(vehicle, identity)
+    autopilot = autopilots.of(vehicle)
+    identity = {name: current[name] for name in autopilot.device_id_names if name in current}
+    read = autopilot.compasses(current)
+    vehicle = replace(vehicle, compasses=read) if read else vehicle
     warnings = _check_identity(wanted, vehicle, any_vehicle=any_vehicle)
-    unknown = [name for name in wanted.values if _COMPASS.match(name) and name not in current]
+    unknown = [name for name in wanted.values if _is_of_compass(name) and name not in current]
     if unknown:
         raise WriteError(
             f"{', '.join(unknown)} must exist on the vehicle; instead the vehicle does not know "
@@ -156,11 +134,11 @@ def plan(
     return WritePlan(
         vehicle=vehicle,
         old=held,
-        new={n: v for n, v in asked.items() if not _SWITCH.fullmatch(n) and v != held[n]},
-        switches={n: asked.get(n, v) for n, v in held.items() if _SWITCH.fullmatch(n)},
+        new={n: v for n, v in asked.items() if not _is_switch(n) and v != held[n]},
+        switches={n: asked.get(n, v) for n, v in held.items() if _is_switch(n)},
         identity=identity,
         left_out=tuple(name for name in wanted.values if name not in asked),
-        warnings=(*warnings, *_warnings(current, asked)),
+        warnings=(*warnings, *_warnings(vehicle, current, asked)),
     )
 
 
@@ -188,9 +166,10 @@ def _asked(wanted: ParameterSet) -> dict[str, float]:
             asked[name] = as_float32(value)
         except ValueError as error:
             raise ParameterFileError(f"{name}: {error}") from error
-        if name in _CHOICES and value not in _CHOICES[name]:
+        choices = _choices(name)
+        if choices and value not in choices:
             raise ParameterFileError(
-                f"{name} must be one of {', '.join(map(str, _CHOICES[name]))}; "
+                f"{name} must be one of {', '.join(str(int(choice)) for choice in choices)}; "
                 f"instead received {format_value(value)}"
             )
     if not asked:
@@ -202,72 +181,76 @@ def _asked(wanted: ParameterSet) -> dict[str, float]:
 
 
 def _is_calibration(name: str) -> bool:
-    return bool(_SWITCH.fullmatch(name) or _VALUE.fullmatch(name))
+    found = autopilots.parse(name)
+    return found is not None and (found.kind is Kind.SWITCH or found.kind.is_value)
 
 
-def _devices(values: Mapping[str, float]) -> tuple[int, ...]:
-    return tuple(int(values[n]) for n in sorted(values) if _DEVICE.fullmatch(n) and values[n] != 0)
+def _is_switch(name: str) -> bool:
+    found = autopilots.parse(name)
+    return found is not None and found.kind is Kind.SWITCH
 
 
-def _with_devices(vehicle: Vehicle, identity: Mapping[str, float]) -> Vehicle:
-    return replace(vehicle, device_ids=_devices(identity) or vehicle.device_ids)
+def _is_of_compass(name: str) -> bool:
+    return any(name.startswith(autopilot.compass_prefix) for autopilot in autopilots.ALL)
+
+
+def _choices(name: str) -> tuple[int, ...]:
+    return next((found for each in autopilots.ALL if (found := each.choices(name))), ())
 
 
 def _check_identity(wanted: ParameterSet, actual: Vehicle, *, any_vehicle: bool) -> tuple[str, ...]:
     owner = wanted.vehicle
-    devices = owner.device_ids if owner and owner.device_ids else _devices(wanted.values)
-    if owner is None and not devices:
+    compasses = () if owner is None else owner.compasses
+    compasses = compasses or autopilots.of(actual).compasses(wanted.values)
+    if owner is None and not compasses:
         complaint = (
             "the parameters must say which vehicle they belong to; instead they do not, "
             f"and this is {_described(actual)}"
         )
     else:
-        same = _is_subsequence(devices, actual.device_ids) and (
-            owner is None or (owner.autopilot, owner.system) == (actual.autopilot, actual.system)
+        same = _stand_alike(compasses, actual.compasses) and (
+            owner is None or _may_be_one(owner, actual)
         )
-        if same and devices:
+        if same and compasses:
             return ()
         if same:
             return ("The parameters name no compass, so only the system number was compared.",)
-        named = _described(owner) if owner else f"compasses {_listed(devices)}"
+        named = _described(owner) if owner else f"compasses {_listed(compasses)}"
         complaint = f"the vehicle must be {named}; instead it is {_described(actual)}"
     if not any_vehicle:
         raise VehicleRefusedError(f"{complaint} (--any-vehicle writes all the same)")
     return (f"Another vehicle is written on request: {complaint}.",)
 
 
-def _is_subsequence(part: tuple[int, ...], whole: tuple[int, ...]) -> bool:
-    rest = iter(whole)
-    return all(device in rest for device in part)
+def _may_be_one(owner: Vehicle, actual: Vehicle) -> bool:
+    twins = owner.uid and actual.uid and owner.uid != actual.uid
+    same = (owner.autopilot, owner.system) == (actual.autopilot, actual.system)
+    return same and not twins
+
+
+def _stand_alike(wanted: Iterable[Compass], actual: Iterable[Compass]) -> bool:
+    """Whether each slot that is known holds the same sensor: parameters belong to slots."""
+    held = {compass.slot: compass.device_id for compass in actual}
+    return all(held.get(each.slot) == each.device_id for each in wanted if each.device_id)
 
 
 def _described(vehicle: Vehicle) -> str:
     return (
-        f"{vehicle.autopilot} system {vehicle.system} with compasses {_listed(vehicle.device_ids)}"
+        f"{vehicle.autopilot} system {vehicle.system} with compasses {_listed(vehicle.compasses)}"
+        + (f" and flight controller {vehicle.uid}" if vehicle.uid else "")
     )
 
 
-def _listed(devices: tuple[int, ...]) -> str:
-    return ", ".join(map(str, devices)) or "unknown"
+def _listed(compasses: Iterable[Compass]) -> str:
+    """Device ids in the order of the slots; a slot of which nothing is known is a dash."""
+    by_slot = {compass.slot: compass.device_id for compass in compasses if compass.device_id}
+    slots = range(1, max(by_slot, default=0) + 1)
+    return ", ".join(str(by_slot.get(slot, "–")) for slot in slots) or "unknown"
 
 
-def _warnings(current: Mapping[str, float], asked: Mapping[str, float]) -> list[str]:
-    warnings = []
-    limit = current.get(_OFFSETS_MAX, _OFFSETS_MAX_DEFAULT)
-    for name, value in asked.items():
-        if name.startswith("COMPASS_OFS") and abs(value) > limit:
-            warnings.append(
-                f"{name} {format_value(value)} is beyond {_OFFSETS_MAX} {format_value(limit)}: "
-                "the vehicle will refuse to arm."
-            )
-        if name.startswith("COMPASS_SCALE") and not 1 / _SCALE_LIMIT <= value <= _SCALE_LIMIT:
-            warnings.append(f"{name} {format_value(value)} is out of limits and will be ignored.")
-    after = {**current, **asked}
-    vectors = any(
-        value and "MOT" in name and not _SWITCH.fullmatch(name) for name, value in asked.items()
-    )
-    if vectors and after.get("COMPASS_MOTCT") == 0 and not after.get("COMPASS_PMOT_EN"):
-        warnings.append("COMPASS_MOTCT stays 0: the compensation will not be in force.")
-    if after.get("COMPASS_PMOT_EN"):
-        warnings.append("COMPASS_PMOT_EN is on: compass 1 ignores COMPASS_MOT and COMPASS_MOTCT.")
-    return warnings
+def _warnings(
+    vehicle: Vehicle, current: Mapping[str, float], asked: Mapping[str, float]
+) -> list[str]:
+    autopilot, after = autopilots.of(vehicle), {**current, **asked}
+    found = (*autopilot.warnings(after), *autopilot.write_warnings(asked, after))
+    return [f"{text[:1].upper()}{text[1:]}." for text in found]

@@ -156,11 +156,13 @@ def test_only_changes_that_act_on_a_compass_count_as_changes():
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
-@pytest.mark.parametrize("name", ["COMPASS_MOT_X", "COMPASS_DIA2_Y", "COMPASS_SCALE3"])
-def test_a_compass_parameter_that_is_no_number_is_refused_by_name_and_time(name, value):
+@pytest.mark.parametrize(
+    ("name", "compass"), [("COMPASS_MOT_X", 1), ("COMPASS_DIA2_Y", 2), ("COMPASS_SCALE3", 3)]
+)
+def test_a_compass_parameter_that_is_no_number_is_refused_by_name_and_time(name, compass, value):
     said = history((12.0, name, value))
     with pytest.raises(ParameterFileError, match=f"{name} must be a finite number") as caught:
-        ardupilot.calibration_at(said, 1, 20.0)
+        ardupilot.calibration_at(said, compass, 20.0)
     assert "20.0 s" in str(caught.value)
 
 

@@ -15,6 +15,7 @@ import truth
 from logs_made_of_logs import FIXTURES, SWEEP
 
 import magcomp
+from magcomp import autopilots
 from magcomp.cli.app import COMMANDS, run
 from magcomp.cli.truth import KnownTruth
 from magcomp.sources import read
@@ -160,7 +161,8 @@ def test_the_demo_s_truth_is_that_of_the_file() -> None:
     parameters |= {"COMPASS_MOTCT": 2.0, "COMPASS_MOT_X": 0.5, "COMPASS_MOT_Y": 1.0}
     known = KnownTruth(FIXTURES / "flight.json")
     independent = truth.of_fixture("flight", recording.start_unix_s)
-    found = known.heading_error_deg(parameters, 1, 30.0, recording.start_unix_s)
+    in_force = autopilots.of(recording).in_force(parameters, 1).correction
+    found = known.heading_error_deg(in_force, 1, 30.0, recording.start_unix_s)
     expected = truth.heading_error_deg(independent, parameters, 1, 30.0, 30.0)
     # The two look at yaws 10° and 2° apart.
     assert found == pytest.approx(expected, rel=0.02)

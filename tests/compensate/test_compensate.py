@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from magcomp.autopilots import ardupilot
-from magcomp.compensate import Compensator, from_parameters
+from magcomp.compensate import Compensator
 from magcomp.errors import InputError
 from magcomp.geometry import body_from_earth, heading, level_matrix, wrap_angle
 from magcomp.model import CURRENT, THROTTLE, Correction, InForce
@@ -125,13 +125,13 @@ def test_a_million_readings_leave_nothing_behind():
     assert peak - before < 4000
 
 
-def test_from_parameters_is_the_autopilots_own_correction():
+def test_in_force_is_the_autopilots_own_correction():
     values = {
         "COMPASS_MOTCT": 2.0,
         "COMPASS_SCALE2": 1.1,
         **ardupilot.correction_parameters(CORRECTION, 2, 1.1),
     }
-    found = from_parameters(values, 2)
+    found = ardupilot.ArduPilot().in_force(values, 2)
     assert found.regressor == CURRENT
     raw, u = np.array([[50.0, -60.0, 70.0]]), np.array([21.0])
     expected = ardupilot.correct(raw, u, ardupilot.calibration(values, 2))
@@ -139,8 +139,8 @@ def test_from_parameters_is_the_autopilots_own_correction():
     assert found.correction.apply(raw, u) == pytest.approx(CORRECTION.apply(raw, u), abs=1e-3)
 
 
-def test_from_parameters_knows_that_motor_compensation_is_off():
+def test_in_force_knows_that_motor_compensation_is_off():
     values = ardupilot.correction_parameters(CORRECTION, 1, 1.0)
-    found = from_parameters({**values, "COMPASS_MOTCT": 0.0}, 1)
+    found = ardupilot.ArduPilot().in_force({**values, "COMPASS_MOTCT": 0.0}, 1)
     assert found.regressor is None
     assert not found.correction.motor.any()

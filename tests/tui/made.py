@@ -29,13 +29,14 @@ from magcomp.model import (
     Series,
     Vehicle,
     Verdict,
+    compasses_of,
 )
 from magcomp.model import Coverage as Covered
 from magcomp.tui.pictures import CompassPicture, Unexplained, error_rows, shift
 from magcomp.tui.vehicle_card import card_of_recording
 from magcomp.tui.work import Work
 
-QUAD = Vehicle("ardupilot", "copter", 1, 1, "4.6.3", (97539, 131874, 263178))
+QUAD = Vehicle("ardupilot", "copter", 1, 1, "4.6.3", compasses_of((97539, 131874, 263178)))
 PORTS = (
     SerialPort("/dev/ttyACM0", "CubeOrange"),
     SerialPort("/dev/ttyUSB0", "FT231X telemetry radio"),

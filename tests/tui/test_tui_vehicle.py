@@ -200,7 +200,9 @@ async def test_only_the_chosen_compasses_are_written(tmp_path):
         assert session.held["COMPASS_MOT3_X"] == -1.5
 
 
-async def test_a_compass_left_out_whose_stored_vector_would_act_is_warned_of(tmp_path):
+async def test_a_compass_left_out_whose_stored_vector_would_act_is_set_to_0(
+    tmp_path,
+):
     session = disarmed()
     async with scripted.app(tmp_path, session=session).run_test(size=(120, 40)) as pilot:
         work = await fitted(pilot)
@@ -209,7 +211,9 @@ async def test_a_compass_left_out_whose_stored_vector_would_act_is_warned_of(tmp
         recording = replace(work.recording, parameters=history)
         pilot.app.set_work(replace(work, recording=recording))
         await press(pilot, "2")
-        await until(pilot, lambda: "its stored vector (9, 0, 0) will act" in screen(pilot.app))
+        await until(
+            pilot, lambda: "vector (9, 0, 0) would act, so it is set to 0" in screen(pilot.app)
+        )
 
 
 async def test_a_rejected_compass_cannot_be_chosen(tmp_path):

@@ -20,11 +20,11 @@ import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from magcomp.errors import LinkError
-from magcomp.model import ParameterSet, Vehicle
+from magcomp.model import ParameterSet, Vehicle, compasses_of
 
 SYSTEM, COMPONENT = 1, 1
 DEVICES = (97539, 131874, 263178)
-QUAD = Vehicle("ardupilot", "copter", SYSTEM, COMPONENT, "4.6.3", DEVICES)
+QUAD = Vehicle("ardupilot", "copter", SYSTEM, COMPONENT, "4.6.3", compasses_of(DEVICES))
 INT8, INT32, REAL32 = 2, 6, 9
 BOOT_TIME = 3.0  # seconds a reboot takes
 STORE_TIME = 0.1  # seconds until a write has reached the storage

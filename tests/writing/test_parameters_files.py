@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from magcomp.errors import OutputError, ParameterFileError, UsageError
-from magcomp.model import ParameterSet, Vehicle
+from magcomp.model import Compass, ParameterSet, Vehicle, compasses_of
 from magcomp.writing.files import (
     SUFFIXES,
     format_parameters,
@@ -21,7 +21,7 @@ from magcomp.writing.files import (
     write_parameter_file,
 )
 
-QUAD = Vehicle("ardupilot", "copter", 1, 1, "4.6.3", (97539, 131874, 263178))
+QUAD = Vehicle("ardupilot", "copter", 1, 1, "4.6.3", compasses_of((97539, 131874, 263178)))
 ANSWER = ParameterSet(
     {"COMPASS_MOTCT": 2.0, "COMPASS_MOT_X": float(np.float32(-1.83)), "COMPASS_MOT_Y": 0.0},
     QUAD,
@@ -37,6 +37,18 @@ comment_lines = (
         lambda line: not line.startswith(("magcomp-vehicle:", "Onboard", "Vehicle-Id", "\ufeff"))
     )
 )
+plain_compasses = st.lists(st.integers(1, 2**24), max_size=3).map(compasses_of)
+told_compasses = st.lists(
+    st.builds(
+        Compass,
+        slot=st.integers(1, 4),
+        device_id=st.integers(0, 2**24),
+        external=st.none() | st.booleans(),
+        orientation=st.none() | st.integers(0, 42),
+        used=st.none() | st.booleans(),
+    ),
+    max_size=3,
+).map(tuple)
 vehicles = st.builds(
     Vehicle,
     autopilot=st.sampled_from(["ardupilot", "px4"]),
@@ -45,7 +57,8 @@ vehicles = st.builds(
     component=st.integers(1, 255),
     firmware=st.text(max_size=10),
     board=st.text(max_size=10),
-    device_ids=st.lists(st.integers(1, 2**24), max_size=3).map(tuple),
+    compasses=plain_compasses | told_compasses,
+    uid=st.text("0123456789abcdef", max_size=36),
 )
 parameter_sets = st.builds(
     ParameterSet,

@@ -9,7 +9,7 @@ import pytest
 from fake_autopilot import DEVICES, NEW, OLD, QUAD, WANTED, FakeAutopilot
 
 from magcomp.errors import ParameterFileError, VehicleRefusedError, WriteError
-from magcomp.model import ParameterSet, Vehicle
+from magcomp.model import ParameterSet, Vehicle, compasses_of
 from magcomp.writing.events import (
     Intends,
     Outcome,
@@ -45,7 +45,7 @@ def test_differences_below_float32_are_none() -> None:
 
 
 def test_the_backup_holds_every_calibration_value_and_the_devices(tmp_path: Path) -> None:
-    backup = plan(HELD, wanting(COMPASS_MOT_X=5.0), replace(QUAD, device_ids=())).backup
+    backup = plan(HELD, wanting(COMPASS_MOT_X=5.0), replace(QUAD, compasses=())).backup
     assert {name: backup.values[name] for name in OLD} == OLD
     assert backup.vehicle == QUAD
     write_parameter_file(tmp_path / "b.param", backup)
@@ -120,9 +120,9 @@ def test_a_vehicle_that_cannot_be_backed_up_is_refused() -> None:
 STRANGERS = [
     replace(QUAD, autopilot="px4"),
     replace(QUAD, system=7),
-    replace(QUAD, device_ids=(1, 2, 3)),
-    replace(QUAD, device_ids=(*DEVICES[1:], DEVICES[0])),
-    replace(QUAD, device_ids=(*DEVICES, 4)),
+    replace(QUAD, compasses=compasses_of((1, 2, 3))),
+    replace(QUAD, compasses=compasses_of((*DEVICES[1:], DEVICES[0]))),
+    replace(QUAD, compasses=compasses_of((*DEVICES, 4))),
 ]
 
 
@@ -143,7 +143,7 @@ def test_another_vehicle_is_written_on_request_and_warned_about(owner: Vehicle) 
 
 
 def test_a_log_that_knew_fewer_compasses_is_the_same_vehicle() -> None:
-    owner = replace(QUAD, device_ids=DEVICES[1:])
+    owner = replace(QUAD, compasses=QUAD.compasses[1:])
     assert plan(HELD, wanting(owner, COMPASS_MOT_X=5.0), QUAD).warnings == ()
 
 
@@ -157,7 +157,7 @@ def test_a_set_without_owner_is_refused_unless_it_holds_device_ids() -> None:
 
 
 def test_a_set_without_device_ids_is_warned_about() -> None:
-    owner = replace(QUAD, device_ids=())
+    owner = replace(QUAD, compasses=())
     assert "name no compass" in plan(HELD, wanting(owner, COMPASS_MOT_X=5.0), QUAD).warnings[0]
 
 

@@ -1,0 +1,331 @@
+"""What magcomp must know of a firmware: its names, its habits, and what it does to a reading.
+
+An implementation owns every such fact. Nothing outside this package names a firmware or one of
+its compass parameters; it asks the implementation, which :func:`magcomp.autopilots.of` finds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Protocol
+
+import numpy as np
+
+from magcomp.errors import InputError
+from magcomp.model import Compass, Correction, FloatArray, InForce, ParameterHistory, Recording
+
+
+class Kind(IntEnum):
+    """What a compass parameter is, in the order in which a table shows them."""
+
+    SWITCH = 0
+    MOTOR = 1
+    OFFSET = 2
+    DIAGONAL = 3
+    OFF_DIAGONAL = 4
+    SCALE = 5
+    PER_MOTOR = 6
+    DEVICE = 7
+    SETTING = 8
+
+    @property
+    def is_value(self) -> bool:
+        """A calibration value: written, and not a switch."""
+        return Kind.MOTOR <= self <= Kind.PER_MOTOR
+
+
+@dataclass(frozen=True)
+class ParameterName:
+    """A compass parameter's name, taken apart.
+
+    Attributes
+    ----------
+    kind
+        What it is.
+    compass
+        1, 2, …; 0 where it serves all compasses.
+    vector
+        The name without its axis.
+    axis
+        ``"X"``, ``"Y"`` or ``"Z"``; empty where it is no part of a vector.
+    """
+
+    kind: Kind
+    compass: int
+    vector: str
+    axis: str = ""
+
+
+@dataclass(frozen=True)
+class FieldMeaning:
+    """What a source's compass readings are.
+
+    Attributes
+    ----------
+    truncated
+        Cut towards zero to whole mGauss.
+    applied_later_s
+        The firmware corrects a reading with a control quantity this much older than what
+        disturbed it, seconds.
+    """
+
+    truncated: bool
+    applied_later_s: float
+
+
+@dataclass(frozen=True)
+class LagPrior:
+    """What is known of a lag before a recording is looked at, seconds.
+
+    Attributes
+    ----------
+    mean, width
+        Expected value, and its standard error.
+    """
+
+    mean: float
+    width: float
+
+
+@dataclass(frozen=True)
+class LagPriors:
+    """Lags of the field behind the attitude and of the control quantity behind the field."""
+
+    field: LagPrior
+    regressor: LagPrior
+
+
+@dataclass(frozen=True)
+class ThrustCurve:
+    """How a firmware turns thrust demand into a motor's duty.
+
+    Attributes
+    ----------
+    expo
+        −1 … 1: thrust = (1 − expo) · c + expo · c².
+    spin_min, spin_max
+        Duty at c = 0 and c = 1.
+    """
+
+    expo: float
+    spin_min: float
+    spin_max: float
+
+    def thrust(self, duty: FloatArray) -> FloatArray:
+        """Thrust demand 0 … 1 of motors with a duty, any shape.
+
+        Examples
+        --------
+        >>> ThrustCurve(expo=0.0, spin_min=0.1, spin_max=0.9).thrust(np.array([0.1, 0.5, 0.9]))
+        array([0. , 0.5, 1. ])
+        """
+        curve = np.clip((duty - self.spin_min) / (self.spin_max - self.spin_min), 0.0, 1.0)
+        return np.asarray((1 - self.expo) * curve + self.expo * curve**2)
+
+
+@dataclass(frozen=True)
+class MotorOutputs:
+    """Which servo outputs drive motors, and what they mean.
+
+    Attributes
+    ----------
+    channels
+        Indices into the outputs.
+    low, high
+        Microseconds of duty 0 and 1.
+    curve
+        From thrust demand to duty; None where unknown.
+    """
+
+    channels: tuple[int, ...]
+    low: float
+    high: float
+    curve: ThrustCurve | None
+
+
+class Autopilot(Protocol):
+    """A firmware.
+
+    ``values`` are parameters by name as they stand at one moment; where a name is missing, the
+    firmware's default stands for it.
+    """
+
+    @property
+    def key(self) -> str:
+        """As in ``Vehicle.autopilot``."""
+        ...
+
+    @property
+    def title(self) -> str:
+        """Its name for people."""
+        ...
+
+    @property
+    def mavlink_number(self) -> int:
+        """HEARTBEAT.autopilot (MAV_AUTOPILOT)."""
+        ...
+
+    @property
+    def integers_as_bytes(self) -> bool:
+        """Whether PARAM_VALUE carries an integer's own bytes; else it is cast to float."""
+        ...
+
+    @property
+    def switch(self) -> str:
+        """The parameter that switches motor compensation for all compasses."""
+        ...
+
+    @property
+    def compass_prefix(self) -> str:
+        """How every name that belongs to the compasses begins, known here or not."""
+        ...
+
+    @property
+    def device_id_names(self) -> tuple[str, ...]:
+        """Parameters that hold the compasses' device ids, in the order of the slots."""
+        ...
+
+    @property
+    def device_ids_describe(self) -> str:
+        """What a device id says, in words, where it does not tell one vehicle from its twin."""
+        ...
+
+    def require_fittable(self, recording: Recording) -> None:
+        """Refuse a recording that no fit can be made of because of its firmware.
+
+        Raises
+        ------
+        MissingDataError
+            The firmware's correction is not known.
+        """
+        ...
+
+    def field_meaning(self, source_format: str) -> FieldMeaning:
+        """What the readings of a source are, by ``Recording.format``."""
+        ...
+
+    def lag_priors(self, source_format: str) -> LagPriors:
+        """What is known of the lags beforehand, by ``Recording.format``."""
+        ...
+
+    def motor_outputs(self, parameters: ParameterHistory, outputs: int) -> MotorOutputs | None:
+        """Which of so many servo outputs drive motors; None where the parameters contradict."""
+        ...
+
+    def parse(self, name: str) -> ParameterName | None:
+        """Take a name apart; None where it is no compass parameter known here."""
+        ...
+
+    def integer_type(self, name: str) -> int | None:
+        """MAV_PARAM_TYPE of a compass parameter that holds whole numbers; None for all others."""
+        ...
+
+    def choices(self, name: str) -> tuple[int, ...]:
+        """The positions a switch has; empty for all other names."""
+        ...
+
+    def compasses(self, values: Mapping[str, float]) -> tuple[Compass, ...]:
+        """The compasses that the parameters tell of, in the order of their slots."""
+        ...
+
+    def changes(
+        self, parameters: ParameterHistory, *, told_per_reading: bool = False
+    ) -> tuple[float, ...]:
+        """Times at which anything that acts on a reading changed, in order.
+
+        Parameters
+        ----------
+        told_per_reading
+            The log tells offset and motor correction with every reading, so that changes of
+            these two do not count.
+        """
+        ...
+
+    def in_force(self, values: Mapping[str, float], compass: int) -> InForce:
+        """What given parameters do to a compass; nothing counts as unseen."""
+        ...
+
+    def in_force_at(self, parameters: ParameterHistory, compass: int, time: float) -> InForce:
+        """What was in force at a time, in seconds; −∞ is the beginning.
+
+        Raises
+        ------
+        ParameterFileError
+            A parameter that acts on this compass is not a finite number.
+        """
+        ...
+
+    def regressor(self, values: Mapping[str, float]) -> str | None:
+        """The control quantity the motor correction is multiplied by; None where it is off."""
+        ...
+
+    def left_out(self, parameters: ParameterHistory) -> Mapping[int, InputError]:
+        """Compasses whose readings cannot be fitted, with the error that says why."""
+        ...
+
+    def correction_parameters(
+        self,
+        correction: Correction,
+        compass: int,
+        values: Mapping[str, float],
+        *,
+        soft_iron_fitted: bool,
+    ) -> dict[str, float]:
+        """Parameters that make this vehicle apply a correction.
+
+        Parameters
+        ----------
+        values
+            Every parameter known of the vehicle; what its firmware does not have is left out.
+        soft_iron_fitted
+            The soft iron is not the one in force, so it belongs to the offsets.
+        """
+        ...
+
+    def switch_parameters(
+        self, regressor: str, compasses: Collection[int], values: Mapping[str, float]
+    ) -> dict[str, float]:
+        """The switch, and zeros for the stored vectors it would wake on all other compasses."""
+        ...
+
+    def neutral_parameters(
+        self, compass: int, regressor: str, values: Mapping[str, float]
+    ) -> dict[str, float]:
+        """What a compass that gets no correction needs when the switch goes on."""
+        ...
+
+    def relevant_names(self) -> tuple[str, ...]:
+        """What to read from a vehicle before it is fitted or written."""
+        ...
+
+    def useful_names(self) -> tuple[str, ...]:
+        """What else a fit likes to know of a live vehicle."""
+        ...
+
+    def output_names(self) -> tuple[str, ...]:
+        """Which outputs drive motors: not there on small boards, so asking in vain takes time."""
+        ...
+
+    def warnings(self, values: Mapping[str, float]) -> tuple[str, ...]:
+        """What stands in the way of a good calibration, a sentence each without its full stop."""
+        ...
+
+    def write_warnings(
+        self, asked: Mapping[str, float], values: Mapping[str, float]
+    ) -> tuple[str, ...]:
+        """What a pilot must know of a write, beyond :meth:`warnings`.
+
+        Parameters
+        ----------
+        asked
+            What shall be written.
+        values
+            What the vehicle will hold afterwards.
+        """
+        ...
+
+    def no_compass_hint(self) -> str:
+        """What to look for where no compass reports."""
+        ...

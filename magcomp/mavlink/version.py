@@ -1,0 +1,49 @@
+"""What AUTOPILOT_VERSION says of a vehicle: its firmware, and the number of its own."""
+
+from __future__ import annotations
+
+
+def firmware_version(packed: int) -> str:
+    """AUTOPILOT_VERSION.flight_sw_version, a byte each of major, minor, patch and type.
+
+    Returns
+    -------
+    str
+        Such as ``"4.6.3"``; empty where it was not set.
+
+    Examples
+    --------
+    >>> firmware_version(0x040603FF)
+    '4.6.3'
+    """
+    if not packed:
+        return ""
+    return f"{packed >> 24 & 255}.{packed >> 16 & 255}.{packed >> 8 & 255}"
+
+
+def unique_id(uid2: bytes, uid: int) -> str:
+    """The flight controller's own number, which tells it from its twins.
+
+    Parameters
+    ----------
+    uid2
+        AUTOPILOT_VERSION.uid2, 18 bytes; zeros where unknown.
+    uid
+        AUTOPILOT_VERSION.uid, which older firmware sends alone; 0 where unknown.
+
+    Returns
+    -------
+    str
+        Hexadecimal, without the zeros at the end of ``uid2``; empty where neither is known.
+
+    Examples
+    --------
+    >>> unique_id(bytes([0x27, 0, 0x51]) + bytes(15), 0)
+    '270051'
+    >>> unique_id(bytes(18), 0x1234)
+    '1234'
+    """
+    used = uid2.rstrip(b"\0")
+    if used:
+        return used.hex()
+    return f"{uid:x}" if uid else ""
