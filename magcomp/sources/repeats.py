@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from magcomp.mavlink.checksum import OffsetArray
 from magcomp.mavlink.frames import Frames, MaskArray
@@ -10,6 +11,7 @@ from magcomp.sources.clock import NO_STAMP
 
 # Odd, so that no two keys are mixed alike; large, so that neighbouring ones end far apart.
 _MIX = np.int64(0x1E3779B97F4A7C15)
+_DRAWERS = 2
 
 
 def repeated(frames: Frames, stamp: OffsetArray) -> MaskArray:
@@ -45,16 +47,33 @@ def repeated(frames: Frames, stamp: OffsetArray) -> MaskArray:
     return copies
 
 
+def _sharing(mixture: OffsetArray) -> NDArray[np.intp]:
+    """Rows whose number stands in other rows too, increasing, shape (k,)."""
+    n = len(mixture)
+    # Rows in one drawer may be equal; those alone in theirs are not, and are most.
+    bits = (_DRAWERS * n).bit_length()
+    drawer = mixture.view(np.uint64) >> np.uint64(64 - bits)
+    last = np.zeros(1 << bits, dtype=np.int32)
+    number = np.arange(n, dtype=np.int32)
+    last[drawer] = number
+    shared = np.zeros(1 << bits, dtype=bool)
+    shared[drawer[last[drawer] != number]] = True
+    rows = np.flatnonzero(shared[drawer])
+    order = rows[np.argsort(mixture[rows], kind="stable")]
+    same = mixture[order][1:] == mixture[order][:-1]
+    twice = np.zeros(len(order), dtype=bool)
+    twice[1:] |= same
+    twice[:-1] |= same
+    return np.sort(order[twice])
+
+
 def _seen_before(key: OffsetArray, content: OffsetArray) -> MaskArray:
     """Which rows equal an earlier row in both arrays, shape (n,)."""
     result = np.zeros(len(key), dtype=bool)
-    # Equal rows have equal mixtures; sorting those alone is fast and nearly always settles it.
-    mixture = key * _MIX + content
-    ordered = np.sort(mixture)
-    doubtful = ordered[1:][ordered[1:] == ordered[:-1]]
-    if not len(doubtful):
+    # Equal rows have equal mixtures; comparing those alone is fast and nearly always settles it.
+    rows = _sharing(key * _MIX + content)
+    if not len(rows):
         return result
-    rows = np.flatnonzero(np.isin(mixture, doubtful))
     ranked = rows[np.lexsort((content[rows], key[rows]))]
     twice = (key[ranked][1:] == key[ranked][:-1]) & (content[ranked][1:] == content[ranked][:-1])
     result[ranked[1:][twice]] = True
