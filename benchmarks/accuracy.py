@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from magcomp import autopilots
 from magcomp.analysis import analyse
 from magcomp.autopilots import ardupilot
 from magcomp.cli.truth import KnownTruth
@@ -29,9 +30,11 @@ AMPERES_AT_FULL_THROTTLE = 120.0
 
 def heading_error(log: Path, result: CompassResult, unix_s: float) -> str:
     truth = KnownTruth(log.with_suffix(".json"))
+    written = (
+        autopilots.named("ardupilot").in_force(result.parameters, result.fit.compass).correction
+    )
     errors = [
-        truth.heading_error_deg(result.parameters, result.fit.compass, float(a), unix_s)
-        for a in AMPERES
+        truth.heading_error_deg(written, result.fit.compass, float(a), unix_s) for a in AMPERES
     ]
     bound = max(row.p95 for row in result.verdict.heading_error if row.u <= AMPERES[-1])
     return f"{max(errors):.2f}° (bound {bound:.2f}°)"
