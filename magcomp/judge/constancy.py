@@ -136,7 +136,7 @@ class _Linear:
 def _larger(first: FloatArray, second: FloatArray) -> FloatArray:
     """The covariance that is nowhere smaller on its diagonal than either."""
     scale = np.sqrt(np.maximum(np.diag(second) / np.maximum(np.diag(first), 1e-18), 1.0))
-    return first * np.outer(scale, scale)
+    return np.asarray(first * np.outer(scale, scale))
 
 
 def departures_of(problem: Problem, fit: MotorFit, lags: Lags) -> tuple[Departure, ...]:
