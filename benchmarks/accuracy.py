@@ -16,11 +16,10 @@ from pathlib import Path
 
 import numpy as np
 
-from magcomp import autopilots
 from magcomp.analysis import analyse
 from magcomp.autopilots import ardupilot
 from magcomp.cli.truth import KnownTruth
-from magcomp.model import CURRENT, CompassResult
+from magcomp.model import CURRENT, CompassResult, Recording
 from magcomp.sources import read
 
 FIXTURES = Path(__file__).resolve().parent.parent / "sitl_fixtures"
@@ -28,13 +27,13 @@ AMPERES = np.arange(0.0, 51.0, 5.0)
 AMPERES_AT_FULL_THROTTLE = 120.0
 
 
-def heading_error(log: Path, result: CompassResult, unix_s: float) -> str:
+def heading_error(log: Path, result: CompassResult, recording: Recording) -> str:
     truth = KnownTruth(log.with_suffix(".json"))
-    written = (
-        autopilots.named("ardupilot").in_force(result.parameters, result.fit.compass).correction
-    )
+    values = {**recording.parameters.latest, **result.parameters}
+    written = ardupilot.ArduPilot().in_force(values, result.fit.compass).correction
     errors = [
-        truth.heading_error_deg(written, result.fit.compass, float(a), unix_s) for a in AMPERES
+        truth.heading_error_deg(written, result.fit.compass, float(a), recording.start_unix_s)
+        for a in AMPERES
     ]
     bound = max(row.p95 for row in result.verdict.heading_error if row.u <= AMPERES[-1])
     return f"{max(errors):.2f}° (bound {bound:.2f}°)"
@@ -62,7 +61,7 @@ def main() -> None:
             if not result.parameters
             else vector_error(log, result)
             if result.fit.method == "sweep"
-            else heading_error(log, result, recording.start_unix_s)
+            else heading_error(log, result, recording)
             for result in results
         ]
         fit = results[0].fit
