@@ -47,7 +47,7 @@ from magcomp.autopilots.protocol import (
     ThrustCurve,
 )
 from magcomp.errors import InputError
-from magcomp.model import Compass, Correction, InForce, ParameterHistory, Recording
+from magcomp.model import Compass, Correction, InForce, ParameterHistory, Recording, Series
 
 _MOTOR_FUNCTIONS = frozenset([*range(33, 41), *range(82, 86)])
 _DEFAULT_MOTORS = 4
@@ -143,7 +143,11 @@ class ArduPilot:
         return ardupilot_settings.compasses(values)
 
     def changes(
-        self, parameters: ParameterHistory, *, told_per_reading: bool = False
+        self,
+        parameters: ParameterHistory,
+        *,
+        armed: Series | None = None,  # noqa: ARG002
+        told_per_reading: bool = False,
     ) -> tuple[float, ...]:
         """Any report of an acting parameter with another value than before."""
         names = ACTING
@@ -159,7 +163,14 @@ class ArduPilot:
         """Every parameter acts at once, armed or not."""
         return in_force(calibration(values, compass))
 
-    def in_force_at(self, parameters: ParameterHistory, compass: int, time: float) -> InForce:
+    def in_force_at(
+        self,
+        parameters: ParameterHistory,
+        compass: int,
+        time: float,
+        *,
+        armed: Series | None = None,  # noqa: ARG002
+    ) -> InForce:
         """Every parameter acts from its report, armed or not."""
         return in_force(calibration_at(parameters, compass, time), unseen(parameters, compass))
 
@@ -177,6 +188,7 @@ class ArduPilot:
         compass: int,
         values: Mapping[str, float],
         *,
+        regressor: str,  # noqa: ARG002
         soft_iron_fitted: bool,
     ) -> dict[str, float]:
         """COMPASS_OFS, DIA, ODI and MOT; COMPASS_SCALE stays as it is.
@@ -196,7 +208,12 @@ class ArduPilot:
         }
 
     def switch_parameters(
-        self, regressor: str, compasses: Collection[int], values: Mapping[str, float]
+        self,
+        regressor: str,
+        compasses: Collection[int],
+        values: Mapping[str, float],
+        *,
+        battery: int = 0,  # noqa: ARG002
     ) -> dict[str, float]:
         """COMPASS_MOTCT, and zeros for what it would wake."""
         made = {COMPENSATION_SWITCH: float(COMPENSATION_OF[regressor])}

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from magcomp.mavlink import stream
 from magcomp.model import Recording
-from magcomp.sources import tlog
+from magcomp.sources import tlog, ulog
 from magcomp.sources.source import is_text
 from magcomp.sources.vehicles import Choice
 
@@ -138,6 +138,7 @@ def _begins(*beginnings: bytes) -> Callable[[bytes], bool]:
 # ---------------------------------------------------------------- the tables
 
 FORMATS: tuple[Format, ...] = (
+    Format("ulog", "a PX4 log (.ulg)", ulog.recognises, of_one_vehicle(ulog.read_ulog)),
     Format("tlog", "a telemetry log (.tlog)", tlog.recognises, tlog.read_chosen),
 )
 """Every format that is read, in the order in which they are asked."""
@@ -148,7 +149,6 @@ OTHERS: tuple[Other, ...] = (
     Other("an empty file", "copy it again from where it came", lambda head: not head),
     Other("a dataflash log (.BIN)", _NOT_YET, _begins(b"\xa3\x95"), is_log=True),
     Other("a dataflash log in text (.log)", _NOT_YET, _is_text_dataflash, is_log=True),
-    Other("a PX4 log (.ulg)", _NOT_YET, _begins(b"ULog\x01\x12\x35"), is_log=True),
     Other(
         "raw MAVLink without times (.rlog)",
         "give the .tlog that the ground station wrote beside it",

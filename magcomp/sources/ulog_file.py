@@ -1,0 +1,230 @@
+"""The topics, parameters and facts of a PX4 log (.ulg), whatever is wrong with the file.
+
+pyulog takes the file apart. It prints what it finds wrong, raises whatever happens to it, believes
+any length that a format claims, and looks at damaged bytes one by one; all of that ends here.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pyulog import ULog, core
+
+from magcomp.errors import LogError
+from magcomp.model import FloatArray
+
+Columns = Mapping[str, NDArray[Any]]
+
+MICROSECOND = 1e-6
+
+_LONGEST_MESSAGE = 1 << 16
+"""A message's length is told in 16 bits, so no topic is longer."""
+
+_READS_PER_BYTE = 0.5
+_READS_ALWAYS = 10_000
+"""A sound file takes two reads for each message of at least 10 bytes."""
+
+_DAY_US = 86_400_000_000
+
+
+def _say_nothing(*_: object, **__: object) -> None:
+    """Stand for print inside pyulog: a log's damage is told by what is read of it."""
+
+
+core.print = _say_nothing
+
+
+@dataclass(frozen=True, eq=False)
+class Topic:
+    """One instance of a topic.
+
+    Attributes
+    ----------
+    columns
+        Field name, such as ``"q[0]"``, to its values, shape (n,) each.
+    """
+
+    columns: Columns
+
+    def __len__(self) -> int:
+        return len(self.columns["timestamp"])
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.columns
+
+    def number(self, name: str) -> FloatArray:
+        """A field as float64, shape (n,)."""
+        # A signalling NaN becomes a quiet one, and no warning.
+        with np.errstate(invalid="ignore"):
+            return np.asarray(self.columns[name], dtype=np.float64)
+
+    def vector(self, name: str, size: int) -> FloatArray:
+        """The first fields of an array side by side, shape (n, size)."""
+        return np.stack([self.number(f"{name}[{index}]") for index in range(size)], axis=1)
+
+    def stamp(self) -> NDArray[np.uint64]:
+        """When each row was measured, or else said, microseconds, shape (n,)."""
+        said = self.columns["timestamp"].astype(np.uint64)
+        if "timestamp_sample" not in self.columns:
+            return said
+        measured = self.columns["timestamp_sample"].astype(np.uint64)
+        return np.where(measured > 0, measured, said)
+
+
+@dataclass(frozen=True, eq=False)
+class UlogFile:
+    """What a log holds.
+
+    Attributes
+    ----------
+    topics
+        By name and instance; those that were asked for and came.
+    info
+        Facts such as ``"ver_sw_release"``.
+    initial
+        Parameters at the beginning.
+    changed
+        Time in microseconds, name and value of each parameter that was set later.
+    messages
+        Texts of the log, oldest first.
+    damaged
+        Whether bytes had to be stepped over.
+    """
+
+    topics: Mapping[tuple[str, int], Topic]
+    info: Mapping[str, Any]
+    initial: Mapping[str, float]
+    changed: tuple[tuple[int, str, float], ...]
+    messages: tuple[str, ...]
+    damaged: bool
+
+    def topic(self, name: str, *fields: str, instance: int = 0) -> Topic | None:
+        """A topic's instance, if it came with these fields."""
+        found = self.topics.get((name, instance))
+        if found is None or not all(each in found for each in fields):
+            return None
+        return found
+
+    def instances(self, name: str, *fields: str) -> dict[int, Topic]:
+        """Every instance of a topic that came with these fields, in order."""
+        return {
+            instance: topic
+            for (each, instance), topic in sorted(self.topics.items(), key=lambda item: item[0])
+            if each == name and all(wanted in topic for wanted in fields)
+        }
+
+
+@dataclass
+class _Bounded(io.RawIOBase):
+    """A file in memory that ends a search that goes over its bytes one by one."""
+
+    data: bytes
+    source: str
+    _file: io.BytesIO = field(init=False)
+    _reads: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._file = io.BytesIO(self.data)
+        self._reads = _READS_ALWAYS + _READS_PER_BYTE * len(self.data)
+
+    def read(self, size: int = -1) -> bytes:
+        self._reads -= 1
+        if self._reads < 0:
+            raise LogError(
+                f"Log {self.source} must be a whole PX4 log (.ulg); instead received one that is "
+                f"damaged from byte {self._file.tell()} on: copy it again from the vehicle."
+            )
+        return self._file.read(size)
+
+    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
+        return self._file.seek(offset, whence)
+
+    def tell(self) -> int:
+        return self._file.tell()
+
+
+def read_ulog_file(data: bytes, source: str, wanted: Collection[str]) -> UlogFile:
+    """Take apart a log.
+
+    Parameters
+    ----------
+    data
+        The whole file.
+    source
+        Its name, for messages.
+    wanted
+        Names of the topics to read.
+
+    Raises
+    ------
+    LogError
+        It cannot be taken apart, or claims a topic longer than any message.
+    """
+    header = _parse(data, source, None, header_only=True)
+    for name in wanted:
+        form = header.message_formats.get(name)
+        if form is not None and _too_long(form):
+            raise LogError(
+                f"Log {source} must describe its topics; instead its {name} claims to be longer "
+                "than a message can be: copy it again from the vehicle."
+            )
+    log = _parse(data, source, list(wanted), header_only=False)
+    return UlogFile(
+        topics=_topics(log),
+        info=dict(log.msg_info_dict),
+        initial={name: float(v) for name, v in log.initial_parameters.items() if _is_number(v)},
+        changed=tuple(
+            (int(time), name, float(v)) for time, name, v in log.changed_parameters if _is_number(v)
+        ),
+        messages=tuple(message.message for message in log.logged_messages),
+        damaged=bool(log.file_corruption),
+    )
+
+
+def _parse(data: bytes, source: str, wanted: list[str] | None, *, header_only: bool) -> Any:
+    try:
+        return ULog(_Bounded(data, source), wanted, parse_header_only=header_only)
+    except (LogError, MemoryError):
+        raise
+    except Exception as error:
+        raise LogError(
+            f"Log {source} must be a PX4 log (.ulg) that can be taken apart; instead received "
+            f"{type(error).__name__} ({_one_line(error)}): copy it again from the vehicle."
+        ) from error
+
+
+def _one_line(error: Exception) -> str:
+    return re.sub(r"\s+", " ", str(error))[:80] or "no reason given"
+
+
+def _too_long(form: Any) -> bool:
+    return sum(max(int(count), 1) for _, count, _ in form.fields) > _LONGEST_MESSAGE
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float)
+
+
+def _topics(log: Any) -> dict[tuple[str, int], Topic]:
+    """Rows in order of time, without those of another day than most."""
+    found = {}
+    stamps = [data.data["timestamp"] for data in log.data_list if "timestamp" in data.data]
+    if not stamps:
+        return {}
+    middle = float(np.median(np.concatenate(stamps).astype(np.float64)))
+    for data in log.data_list:
+        if "timestamp" not in data.data:
+            continue
+        stamp = data.data["timestamp"].astype(np.float64)
+        rows = np.flatnonzero(np.abs(stamp - middle) < _DAY_US)
+        rows = rows[np.argsort(stamp[rows], kind="stable")]
+        if len(rows):
+            columns = {name: values[rows] for name, values in data.data.items()}
+            found[data.name, int(data.multi_id)] = Topic(columns)
+    return found
