@@ -22,6 +22,7 @@ from magcomp.autopilots.px4_correction import (
     Calibration,
     Compensation,
     after_start,
+    behind,
     compensation_of,
     in_force,
     offset_zone,
@@ -253,5 +254,4 @@ def _vector(kind: str, compass: int, vector: FloatArray) -> dict[str, float]:
 def _with_shape(wanted: Calibration, present: Calibration) -> Calibration:
     """The same motor vector behind the soft iron that is in force."""
     shaped = replace(wanted, scale=present.scale, off_diagonal=present.off_diagonal)
-    motor = np.linalg.solve(shaped.soft_iron, wanted.soft_iron @ wanted.motor)
-    return replace(shaped, motor=motor)
+    return replace(shaped, motor=behind(shaped, wanted.soft_iron @ wanted.motor))

@@ -271,9 +271,14 @@ def sensor_calibration(
         offset=np.asarray(-rotation.T @ correction.offset / MGAUSS),
         scale=np.diag(soft_iron).copy(),
         off_diagonal=soft_iron[(0, 0, 1), (1, 2, 2)],
-        motor=np.linalg.solve(soft_iron, rotation.T @ correction.motor) / unit,
+        motor=np.asarray(np.linalg.solve(soft_iron, rotation.T @ correction.motor) / unit),
         compensation=compensation,
     )
+
+
+def behind(calibration: Calibration, motor: FloatArray) -> FloatArray:
+    """COMP, shape (3,), that does to the field behind a soft iron what ``motor`` says, (3,)."""
+    return np.asarray(np.linalg.solve(calibration.soft_iron, motor))
 
 
 def in_force(

@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from magcomp.autopilots.px4_correction import AT_START, SHAPE_ZONE, Calibration
+from magcomp.autopilots.px4_correction import AT_START, SHAPE_ZONE, Calibration, behind
 from magcomp.model import FloatArray
 
 _PAST = 1.02
@@ -51,8 +51,7 @@ def noticed(
     offset = _nearest(wanted.offset, (present.offset, AT_START.offset), zone, level)
     shaped = replace(wanted, offset=offset, scale=scale, off_diagonal=off_diagonal)
     # COMP is in front of the soft iron: what it does to the corrected field has to stay.
-    motor = np.linalg.solve(shaped.soft_iron, wanted.soft_iron @ wanted.motor)
-    return replace(shaped, motor=motor)
+    return replace(shaped, motor=behind(shaped, wanted.soft_iron @ wanted.motor))
 
 
 def _nearest(

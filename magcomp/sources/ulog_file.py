@@ -164,17 +164,9 @@ def read_ulog_file(data: bytes, source: str, wanted: Collection[str]) -> UlogFil
     Raises
     ------
     LogError
-        It cannot be taken apart, or claims a topic longer than any message.
+        It cannot be taken apart.
     """
-    header = _parse(data, source, None, header_only=True)
-    for name in wanted:
-        form = header.message_formats.get(name)
-        if form is not None and _too_long(form):
-            raise LogError(
-                f"Log {source} must describe its topics; instead its {name} claims to be longer "
-                "than a message can be: copy it again from the vehicle."
-            )
-    log = _parse(data, source, list(wanted), header_only=False)
+    log = _parse(data, source, list(wanted))
     return UlogFile(
         topics=_topics(log),
         info=dict(log.msg_info_dict),
@@ -187,9 +179,36 @@ def read_ulog_file(data: bytes, source: str, wanted: Collection[str]) -> UlogFil
     )
 
 
-def _parse(data: bytes, source: str, wanted: list[str] | None, *, header_only: bool) -> Any:
+class _Wary(ULog):  # type: ignore[misc]
+    """pyulog that does not take a topic for longer than a message can be."""
+
+    class _MessageAddLogged(ULog._MessageAddLogged):  # type: ignore[misc]
+        def __init__(self, data: bytes, header: Any, message_formats: Mapping[str, Any]) -> None:
+            name = ULog.parse_string(data[3:])
+            if _fields(name, message_formats, {}, ()) > _LONGEST_MESSAGE:
+                # pyulog goes on with the other topics.
+                raise ValueError
+            super().__init__(data, header, message_formats)
+
+
+def _fields(
+    name: str, forms: Mapping[str, Any], known: dict[str, int], above: tuple[str, ...]
+) -> int:
+    """How many fields a format has, those of the formats inside it too."""
+    if name in above:
+        return _LONGEST_MESSAGE + 1
+    if name not in known:
+        total = 0
+        for kind, count, _ in forms[name].fields:
+            each = 1 if kind not in forms else _fields(kind, forms, known, (*above, name))
+            total += max(int(count), 1) * each
+        known[name] = total
+    return known[name]
+
+
+def _parse(data: bytes, source: str, wanted: list[str]) -> Any:
     try:
-        return ULog(_Bounded(data, source), wanted, parse_header_only=header_only)
+        return _Wary(_Bounded(data, source), wanted)
     except (LogError, MemoryError):
         raise
     except Exception as error:
@@ -203,28 +222,27 @@ def _one_line(error: Exception) -> str:
     return re.sub(r"\s+", " ", str(error))[:80] or "no reason given"
 
 
-def _too_long(form: Any) -> bool:
-    return sum(max(int(count), 1) for _, count, _ in form.fields) > _LONGEST_MESSAGE
-
-
 def _is_number(value: object) -> bool:
     return isinstance(value, int | float)
 
 
 def _topics(log: Any) -> dict[tuple[str, int], Topic]:
     """Rows in order of time, without those of another day than most."""
-    found = {}
-    stamps = [data.data["timestamp"] for data in log.data_list if "timestamp" in data.data]
-    if not stamps:
-        return {}
-    middle = float(np.median(np.concatenate(stamps).astype(np.float64)))
+    parts: dict[tuple[str, int], list[Columns]] = {}
     for data in log.data_list:
-        if "timestamp" not in data.data:
-            continue
-        stamp = data.data["timestamp"].astype(np.float64)
+        if "timestamp" in data.data:
+            # What was appended after a crash comes apart from the rest of its topic.
+            parts.setdefault((data.name, int(data.multi_id)), []).append(data.data)
+    if not parts:
+        return {}
+    stamps = [each["timestamp"] for tables in parts.values() for each in tables]
+    middle = float(np.median(np.concatenate(stamps).astype(np.float64)))
+    found = {}
+    for key, tables in parts.items():
+        columns = {name: np.concatenate([each[name] for each in tables]) for name in tables[0]}
+        stamp = columns["timestamp"].astype(np.float64)
         rows = np.flatnonzero(np.abs(stamp - middle) < _DAY_US)
         rows = rows[np.argsort(stamp[rows], kind="stable")]
         if len(rows):
-            columns = {name: values[rows] for name, values in data.data.items()}
-            found[data.name, int(data.multi_id)] = Topic(columns)
+            found[key] = Topic({name: values[rows] for name, values in columns.items()})
     return found

@@ -5,13 +5,14 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from magcomp.autopilots.px4_correction import MGAUSS, Compensation, stored
 from magcomp.autopilots.px4_rotation import sensor_to_body
-from magcomp.autopilots.px4_settings import NUMBERS, slot_of
+from magcomp.autopilots.px4_settings import NUMBERS, compasses, slot_of
 from magcomp.model import BoolArray, FloatArray, Series
 from magcomp.sources.ulog_file import MICROSECOND, Topic, UlogFile
 
@@ -104,7 +105,8 @@ class Quantities:
             if (number := slot_of(self.values, device)) is not None
         }
         without = (device for device in devices if device not in found)
-        left = (n for n in NUMBERS if not self.values.get(f"CAL_MAG{n - 1}_ID", 0.0))
+        taken = {compass.slot for compass in compasses(self.values)}
+        left = (number for number in NUMBERS if number not in taken)
         return found | dict(zip(without, left, strict=False))
 
     def attitude(self) -> Series | None:
@@ -266,7 +268,7 @@ class Quantities:
         """When each row was said, seconds."""
         return self._seconds(topic.columns["timestamp"])
 
-    def _seconds(self, stamp: FloatArray) -> FloatArray:
+    def _seconds(self, stamp: NDArray[Any]) -> FloatArray:
         return (stamp.astype(np.float64) - float(self.zero)) * MICROSECOND
 
 
