@@ -1,9 +1,10 @@
 """What the emitted parameters leave of heading error, against the truth beside each recording.
 
-For every NAME.tlog with a NAME.json (sitl_fixtures/ by default): the largest heading error at any
-current 0 … 50 A, over all yaws, level and tilted 20°, of each compass, and the 95 % bound that
-magcomp itself states. Sweeps: the error of the interference vector; where only the throttle was
-recorded, against the vector times the 120 A that full throttle drew (recordings README).
+For every NAME.tlog and NAME.BIN with a NAME.json (sitl_fixtures/ by default): the largest heading
+error at any current 0 … 50 A, over all yaws, level and tilted 20°, of each compass, and the 95 %
+bound that magcomp itself states. Sweeps: the error of the interference vector; where only the
+throttle was recorded, against the vector times the 120 A that full throttle drew (recordings
+README).
 
     python benchmarks/accuracy.py [FOLDER]
 """
@@ -19,7 +20,7 @@ import numpy as np
 from magcomp.analysis import analyse
 from magcomp.autopilots import ardupilot
 from magcomp.cli.truth import KnownTruth
-from magcomp.model import CURRENT, CompassResult
+from magcomp.model import CURRENT, CompassResult, Recording
 from magcomp.sources import read
 
 FIXTURES = Path(__file__).resolve().parent.parent / "sitl_fixtures"
@@ -27,10 +28,12 @@ AMPERES = np.arange(0.0, 51.0, 5.0)
 AMPERES_AT_FULL_THROTTLE = 120.0
 
 
-def heading_error(log: Path, result: CompassResult, unix_s: float) -> str:
+def heading_error(log: Path, result: CompassResult, recording: Recording) -> str:
     truth = KnownTruth(log.with_suffix(".json"))
+    values = {**recording.parameters.latest, **result.parameters}
+    written = ardupilot.ArduPilot().in_force(values, result.fit.compass).correction
     errors = [
-        truth.heading_error_deg(result.parameters, result.fit.compass, float(a), unix_s)
+        truth.heading_error_deg(written, result.fit.compass, float(a), recording.start_unix_s)
         for a in AMPERES
     ]
     bound = max(row.p95 for row in result.verdict.heading_error if row.u <= AMPERES[-1])
@@ -48,8 +51,9 @@ def vector_error(log: Path, result: CompassResult) -> str:
 
 def main() -> None:
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else FIXTURES
-    print(f"{'recording':<24}{'method':<8}{'by':<9} compass 1, 2, 3")
-    for log in sorted(folder.glob("*.tlog")):
+    print(f"{'recording':<28}{'method':<8}{'by':<9} compass 1, 2, 3")
+    logs = (path for path in folder.iterdir() if path.suffix in {".tlog", ".BIN"})
+    for log in sorted(logs):
         if not log.with_suffix(".json").exists():
             continue
         recording = read(log)
@@ -59,11 +63,11 @@ def main() -> None:
             if not result.parameters
             else vector_error(log, result)
             if result.fit.method == "sweep"
-            else heading_error(log, result, recording.start_unix_s)
+            else heading_error(log, result, recording)
             for result in results
         ]
         fit = results[0].fit
-        print(f"{log.stem:<24}{fit.method:<8}{fit.regressor:<9} {', '.join(cells)}")
+        print(f"{log.name:<28}{fit.method:<8}{fit.regressor:<9} {', '.join(cells)}")
 
 
 if __name__ == "__main__":

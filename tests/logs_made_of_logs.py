@@ -108,18 +108,23 @@ def of_autopilot(path: Path, autopilot: int) -> Path:
     return changed(path, heartbeat)
 
 
-def with_parameter(path: Path, name: str, value: float) -> Path:
-    """Write a log at whose end a parameter has another value."""
+def with_parameters(path: Path, names: Iterable[str], value: float) -> Path:
+    """Write a log at whose end parameters have another value."""
     all_frames = list(frames(SWEEP))
-    payload = struct.pack("<fHH16sB", value, 1000, 65535, name.encode(), 9)
-    last = all_frames[-1]
-    added = replace(last, message=dialect.MAVLINK_MSG_ID_PARAM_VALUE, payload=payload)
-    return write(path, [*all_frames, added])
+    added = [
+        replace(
+            all_frames[-1],
+            message=dialect.MAVLINK_MSG_ID_PARAM_VALUE,
+            payload=struct.pack("<fHH16sB", value, 1000, 65535, name.encode(), 9),
+        )
+        for name in names
+    ]
+    return write(path, [*all_frames, *added])
 
 
-def with_nan(path: Path, name: str) -> Path:
-    """Write a log at whose end a parameter is no number."""
-    return with_parameter(path, name, math.nan)
+def with_nan(path: Path, *names: str) -> Path:
+    """Write a log at whose end parameters are no numbers."""
+    return with_parameters(path, names, math.nan)
 
 
 def with_second_vehicle(path: Path, system: int) -> Path:

@@ -104,10 +104,10 @@ def analyse(
         Where every compass asked for has a parameter that is not finite.
     """
     wanted = Options() if options is None else options
+    compasses = _compasses(recording, wanted)
     found = _controls_of(recording)
     kinds = _kinds(recording, found, wanted)
     earth = expected_earth(recording)
-    compasses = _compasses(recording, wanted)
     steps = len(kinds) * len(compasses)
     judged: dict[str, list[_Judged]] = {}
     for kind in kinds:
@@ -154,11 +154,12 @@ def check(recording: Recording, options: Options | None = None) -> Mapping[int, 
         As :func:`analyse`.
     """
     wanted = Options() if options is None else options
+    compasses = _compasses(recording, wanted)
     found = _controls_of(recording)
     earth = expected_earth(recording)
     by_kind = reported(found)
     verdicts = {}
-    for compass in _compasses(recording, wanted):
+    for compass in compasses:
         new = readings(recording, compass, start=wanted.start, end=wanted.end)
         kind = new.in_force[-1].regressor or found[0].kind
         if kind not in by_kind:
@@ -211,9 +212,16 @@ def _controls_of(recording: Recording) -> tuple[Control, ...]:
     if not found:
         raise MissingDataError(
             f"{recording.source} must hold a battery current or a throttle that changes; instead "
-            "it holds neither: was the vehicle ever armed?"
+            f"it holds {_silent_controls(recording)}"
         )
     return found
+
+
+def _silent_controls(recording: Recording) -> str:
+    if recording.current is None and recording.throttle is None:
+        how = autopilots.of(recording).how_to_record("control", recording.format)
+        return f"neither: {how}"
+    return "neither: was the vehicle ever armed?"
 
 
 def _kinds(recording: Recording, found: Iterable[Control], wanted: Options) -> list[str]:
@@ -235,8 +243,8 @@ def _compasses(recording: Recording, wanted: Options) -> list[int]:
     autopilot.require_fittable(recording)
     if not recording.field:
         raise MissingDataError(
-            f"{recording.source} must hold readings of a compass (RAW_IMU, SCALED_IMU2 or "
-            "SCALED_IMU3); instead it holds none"
+            f"{recording.source} must hold readings of a compass; instead it holds none: "
+            f"{autopilot.how_to_record('compass', recording.format)}"
         )
     asked = sorted(recording.field) if wanted.compass is None else [wanted.compass]
     left_out = autopilot.left_out(recording.parameters)

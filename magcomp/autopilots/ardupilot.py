@@ -63,6 +63,20 @@ _LOGGED = LagPriors(LagPrior(0.05, 0.05), LagPrior(0.05, 0.1))
 """A reading is the mean over one update of 0.1 s, and is logged when it is made."""
 
 
+_LOG_BITS = {
+    "compass": "set the COMPASS bit of LOG_BITMASK and COMPASS_ENABLE to 1, and fly again",
+    "control": (
+        "set the CURRENT and CTUN bits of LOG_BITMASK and give the log as the vehicle wrote it"
+    ),
+    "attitude": "set the ATTITUDE bit of LOG_BITMASK, and fly again",
+}
+_LINK_MESSAGES = {
+    "compass": "ask for RAW_IMU, SCALED_IMU2 or SCALED_IMU3 at 10 Hz, with COMPASS_ENABLE 1",
+    "control": "was the vehicle ever armed, and does the link carry BATTERY_STATUS or VFR_HUD?",
+    "attitude": "ask for ATTITUDE at 20 Hz",
+}
+
+
 class ArduPilot:
     """See :class:`magcomp.autopilots.protocol.Autopilot`."""
 
@@ -235,6 +249,11 @@ class ArduPilot:
     ) -> tuple[str, ...]:
         """Of vectors without their switch."""
         return tuple(ardupilot_settings.write_warnings(asked, values))
+
+    def how_to_record(self, quantity: str, source_format: str) -> str:
+        """A bit of LOG_BITMASK for its own log, a message for telemetry."""
+        asked = _LOG_BITS if source_format == "dataflash" else _LINK_MESSAGES
+        return asked[quantity]
 
     def no_compass_hint(self) -> str:
         """The switch of all compasses, and the message of the first."""

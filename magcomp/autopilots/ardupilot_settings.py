@@ -35,15 +35,15 @@ def compasses(values: Mapping[str, float]) -> tuple[Compass, ...]:
     """The compasses whose device ids are known and not 0, in the order of their slots."""
     found = []
     for number in NUMBERS:
-        device = values.get(single_name("DEV_ID", number), 0.0)
-        if not math.isfinite(device) or not device:
+        device = _whole(values, single_name("DEV_ID", number))
+        if not device:
             continue
         external = _whole(values, single_name("EXTERN", number))
         used = _whole(values, single_name("USE", number))
         found.append(
             Compass(
                 slot=number,
-                device_id=int(device),
+                device_id=device,
                 external=None if external is None else external > 0,
                 orientation=_whole(values, single_name("ORIENT", number)),
                 used=None if used is None else used > 0,

@@ -326,6 +326,18 @@ class Autopilot(Protocol):
         """
         ...
 
+    def how_to_record(self, quantity: str, source_format: str) -> str:
+        """What to set so that the next recording of a format holds a quantity.
+
+        Parameters
+        ----------
+        quantity
+            ``"compass"``, ``"control"`` (current and throttle) or ``"attitude"``.
+        source_format
+            As in ``Recording.format``.
+        """
+        ...
+
     def no_compass_hint(self) -> str:
         """What to look for where no compass reports."""
         ...

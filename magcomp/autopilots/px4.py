@@ -205,6 +205,10 @@ class Px4:
             return (f"{COMPENSATION_SWITCH} stays 0: the compensation will not be in force",)
         return ()
 
+    def how_to_record(self, quantity: str, source_format: str) -> str:  # noqa: ARG002
+        """A bit of SDLOG_PROFILE."""
+        return f"set SDLOG_PROFILE to 1, which logs the {quantity}, and fly again"
+
     def no_compass_hint(self) -> str:
         """Telemetry sends no compass by itself."""
         return "does the link carry SCALED_IMU?"

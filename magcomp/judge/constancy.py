@@ -40,6 +40,7 @@ _LEAST_SIGMA = 3.5
 _BLOCK_S = 15.0
 _USUAL_DRIFT_MGAUSS = 3.0
 _MAD_TO_STD = 1.4826
+_WIDEST = 0.1
 
 
 @dataclass(frozen=True)
@@ -94,23 +95,48 @@ class _Linear:
         """What ``extra`` columns (n, 2, m) take up, shape (m,), its covariance, and the gain.
 
         ``width`` is what the columns may reasonably take, so that a direction the readings do not
-        show stays at zero instead of running away.
+        show stays at zero instead of running away. Neighbouring readings err alike: they count
+        for as many fewer as their summed scores scatter more than single ones do.
         """
         columns = np.concatenate([self.slopes, extra], axis=2)
         size, more = columns.shape[2], extra.shape[2]
         flat = columns.reshape(-1, size)
+        alike = self._alike()
+        information = flat.T @ flat / alike
         precision = np.concatenate([self.precision, np.full(more, 1.0 / width**2)])
-        bread = np.linalg.pinv(flat.T @ flat + np.diag(precision), hermitian=True)
-        found = -bread @ (flat.T @ self.residuals.reshape(-1))
+        bread = np.linalg.pinv(information + np.diag(precision), hermitian=True)
+        found = -bread @ (flat.T @ self.residuals.reshape(-1)) / alike
         left = self.residuals + columns @ found
-        scores = np.einsum("ngi,ng->ni", columns, left)
-        starts = np.flatnonzero(np.r_[True, np.diff(self.blocks) != 0])
-        summed = np.add.reduceat(scores, starts, axis=0)
+        summed = self._summed(columns, left) / alike
         count = len(summed)
         meat = summed.T @ summed * (count / max(count - size, 1) if count > size else 1.0)
-        covariance = bread @ (meat + np.diag(precision)) @ bread
-        gain = float(np.sum(self.residuals**2) - np.sum(left**2))
+        covariance = bread @ np.diag(precision) @ bread + _larger(
+            bread @ meat @ bread, bread @ information @ bread
+        )
+        gain = float(np.sum(self.residuals**2) - np.sum(left**2)) / alike
         return found[-more:], covariance[-more:, -more:], gain
+
+    def _alike(self) -> float:
+        """How many neighbouring readings say the same thing, on the whole."""
+        size = self.slopes.shape[2]
+        flat = self.slopes.reshape(-1, size)
+        bread = np.linalg.pinv(flat.T @ flat + np.diag(self.precision), hermitian=True)
+        left = self.residuals - self.slopes @ (bread @ (flat.T @ self.residuals.reshape(-1)))
+        summed = self._summed(self.slopes, left)
+        single = np.einsum("ngi,ng->ni", self.slopes, left)
+        ratio = np.trace(bread @ summed.T @ summed) / max(np.trace(bread @ single.T @ single), 1e-9)
+        return float(max(ratio, 1.0))
+
+    def _summed(self, columns: FloatArray, residuals: FloatArray) -> FloatArray:
+        scores = np.einsum("ngi,ng->ni", columns, residuals)
+        starts = np.flatnonzero(np.r_[True, np.diff(self.blocks) != 0])
+        return np.asarray(np.add.reduceat(scores, starts, axis=0))
+
+
+def _larger(first: FloatArray, second: FloatArray) -> FloatArray:
+    """The covariance that is nowhere smaller on its diagonal than either."""
+    scale = np.sqrt(np.maximum(np.diag(second) / np.maximum(np.diag(first), 1e-18), 1.0))
+    return np.asarray(first * np.outer(scale, scale))
 
 
 def departures_of(problem: Problem, fit: MotorFit, lags: Lags) -> tuple[Departure, ...]:
@@ -136,7 +162,7 @@ def departures_of(problem: Problem, fit: MotorFit, lags: Lags) -> tuple[Departur
         return ()
     weight = linear.slopes[:, :, OFFSET], linear.slopes[:, :, MOTOR] / top
     share = np.clip(samples.u / top, 0.0, 2.0)[:, None, None]
-    wide = 0.3 * fit.strength
+    wide = _WIDEST * fit.strength
     curved, covariance, gain = linear.taken_up(weight[1] * share, wide)
     # The bow of q·s² over 0 … 1 departs from its best line by q/8.
     found = [_departure("curve", curved / 8, covariance / 64, gain, horizontal, np.nan)]

@@ -90,7 +90,9 @@ def test_every_name_that_is_read_can_be_taken_apart(autopilot):
     for name in (*autopilot.relevant_names(), autopilot.switch, *autopilot.device_id_names):
         found = autopilot.parse(name)
         assert found is not None, name
-        assert name == f"{found.vector}_{found.axis}" or found.vector in name
+        # PX4 puts the axis before the kind: CAL_MAG0_XCOMP is the X of CAL_MAG0_COMP.
+        assert set(found.vector.split("_")[:-1]) <= set(name.split("_"))
+        assert found.axis in name
         assert name.startswith(autopilot.compass_prefix)
         assert autopilots.parse(name) == found
 
@@ -160,13 +162,6 @@ def test_no_values_make_compasses_that_cannot_be(values):
 
 
 # --- what is in force ----------------------------------------------------------------------------
-
-
-def test_a_vehicle_whose_offsets_are_0_was_never_calibrated():
-    assert ARDUPILOT.in_force(held(), 1).calibrated
-    assert not ARDUPILOT.in_force(held(**vector_parameters("OFS", 2, (0, 0, 0))), 2).calibrated
-    assert not ARDUPILOT.in_force(held(**vector_parameters("OFS", 2, (0.5, 0, 0))), 2).calibrated
-    assert not ARDUPILOT.in_force({}, 1).calibrated
 
 
 def without(*names: str, whole: bool = False) -> ParameterHistory:

@@ -65,8 +65,8 @@ def no_attitude(path: Path) -> None:
     without(path, ATTITUDE)
 
 
-def nan_parameter(path: Path) -> None:
-    with_nan(path, "COMPASS_OFS_X")
+def nan_parameters(path: Path) -> None:
+    with_nan(path, "COMPASS_OFS_X", "COMPASS_OFS2_X", "COMPASS_OFS3_X")
 
 
 def two_vehicles(path: Path) -> None:
@@ -87,7 +87,7 @@ BAD: list[tuple[Callable[[Path], None], str]] = [
     (no_compass, "compass"),
     (no_motors, "neither"),
     (no_attitude, "attitude"),
-    (nan_parameter, "COMPASS_OFS_X must be a finite number"),
+    (nan_parameters, "COMPASS_OFS_X must be a finite number"),
     (two_vehicles, "--system"),
     (px4, "ArduPilot"),
 ]
@@ -112,6 +112,19 @@ def test_bad_input_gets_one_sentence(
     assert captured.err.endswith((".\n", "?\n"))
     assert captured.err.count("\n") == 1
     assert why in captured.err
+
+
+def test_a_compass_with_a_parameter_of_nan_does_not_block_the_others(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = tmp_path / "nan.tlog"
+    with_nan(log, "COMPASS_OFS2_Y")
+    assert run(["fit", str(log), "--json", "--regressor", "current"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert [compass["compass"] for compass in found["compasses"]] == [1, 3]
+    assert any("COMPASS_OFS2_Y must be a finite number" in note for note in found["notes"])
+    assert run(["fit", str(log), "--compass", "2"]) == 2
+    assert "COMPASS_OFS2_Y must be a finite number" in capsys.readouterr().err
 
 
 def test_nothing_is_overwritten_by_bad_input(
@@ -160,7 +173,7 @@ def test_a_log_without_parameters_is_no_ground_to_write_anything(
     assert run(["fit", str(log), "--json", *SINGLE]) == 1
     found = json.loads(capsys.readouterr().out)
     assert found["compasses"][0]["parameters"] == {}
-    assert "COMPASS_OFS_X" in found["compasses"][0]["reasons"][0]
+    assert "COMPASS_DIA_X" in found["compasses"][0]["reasons"][0]
     assert any("no parameters" in note for note in found["notes"])
 
 

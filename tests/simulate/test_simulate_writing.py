@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from magcomp.model import ParameterSet
+from magcomp.model import ParameterSet, compasses_of
 from magcomp.model import Vehicle as Identity
 from magcomp.simulate import Faults, FaultyLink, LocalConnection, Vehicle, scenario
 from magcomp.writing import writer
@@ -17,7 +17,7 @@ NAMES = [
     for kind in ("OFS", "DIA", "ODI", "MOT")
     for axis in "XYZ"
 ]
-IDENTITY = Identity("ardupilot", "copter", 1, 1, "4.6.3", (97539, 131874, 263178))
+IDENTITY = Identity("ardupilot", "copter", 1, 1, "4.6.3", compasses_of((97539, 131874, 263178)))
 
 
 def parked():
