@@ -239,7 +239,8 @@ def _topics(log: Any) -> dict[tuple[str, int], Topic]:
     middle = float(np.median(np.concatenate(stamps).astype(np.float64)))
     found = {}
     for key, tables in parts.items():
-        columns = {name: np.concatenate([each[name] for each in tables]) for name in tables[0]}
+        alike = [each for each in tables if each.keys() == tables[0].keys()]
+        columns = {name: np.concatenate([each[name] for each in alike]) for name in tables[0]}
         stamp = columns["timestamp"].astype(np.float64)
         rows = np.flatnonzero(np.abs(stamp - middle) < _DAY_US)
         rows = rows[np.argsort(stamp[rows], kind="stable")]
