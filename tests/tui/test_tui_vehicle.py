@@ -169,7 +169,7 @@ async def test_a_snapshot_that_fails_is_told_once_and_the_app_goes_on(tmp_path):
     async with app.run_test() as pilot:
         app.follow(Broken())
         await until(pilot, lambda: isinstance(app.screen, Message))
-        assert "udp:1:2 is gone." in screen(app)
+        assert "Udp:1:2 is gone." in screen(app)
         await press(pilot, "enter")
         assert app.is_running
 
