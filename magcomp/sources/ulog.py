@@ -78,7 +78,7 @@ def read_ulog(path: str | Path) -> Recording:
             f"Log {path} must hold messages of a vehicle; instead received a PX4 log without one "
             "of those needed: was logging stopped at once?"
         )
-    zero = min(int(topic.columns["timestamp"][0]) for topic in log.topics.values())
+    zero = min(log.start, *(int(topic.columns["timestamp"][0]) for topic in log.topics.values()))
     last = max(int(topic.columns["timestamp"][-1]) for topic in log.topics.values())
     parameters = _parameters(log, zero)
     values = parameters.latest

@@ -208,6 +208,14 @@ def test_rows_of_another_day_and_out_of_order_do_not_spoil_the_time(recorded) ->
     assert 33.0 in found.current.value
 
 
+def test_what_was_said_before_the_log_does_not_move_its_beginning(recorded) -> None:
+    writer = short_flight(2)
+    writer.row("vehicle_gps_position", -4.0, 0, 473_977_420, 85_455_940, 488_000, 3)
+    found = recorded(writer)
+    assert found.duration_s == pytest.approx(1.9)
+    assert found.field[1].time[0] == 0.0
+
+
 @pytest.mark.parametrize("path", [*RECORDINGS, *REAL], ids=lambda path: path.stem)
 def test_every_wanted_field_is_what_the_reference_reads(path: Path) -> None:
     found, reference = read(path), ULog(str(path))
