@@ -70,13 +70,19 @@ class Topic:
         """The first fields of an array side by side, shape (n, size)."""
         return np.stack([self.number(f"{name}[{index}]") for index in range(size)], axis=1)
 
-    def stamp(self) -> NDArray[np.uint64]:
-        """When each row was measured, or else said, microseconds, shape (n,)."""
-        said = self.columns["timestamp"].astype(np.uint64)
+    def said(self, zero: int) -> FloatArray:
+        """When each row was said, seconds since ``zero`` microseconds, shape (n,)."""
+        return (self.number("timestamp") - zero) * MICROSECOND
+
+    def measured(self, zero: int) -> FloatArray:
+        """When each row was measured, or else said, seconds since ``zero``, shape (n,)."""
+        said = self.number("timestamp")
         if "timestamp_sample" not in self.columns:
-            return said
-        measured = self.columns["timestamp_sample"].astype(np.uint64)
-        return np.where(measured > 0, measured, said)
+            return (said - zero) * MICROSECOND
+        measured = self.number("timestamp_sample")
+        # What is not set is 0, and a reading does not wait for long.
+        believed = np.abs(said - measured) < _DAY_US
+        return (np.where(believed, measured, said) - zero) * MICROSECOND
 
 
 @dataclass(frozen=True, eq=False)
