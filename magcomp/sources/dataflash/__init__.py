@@ -87,7 +87,8 @@ def _recording(source: str, unpacked: Unpacked, size: int) -> Recording:
     log = Log(unpacked.tables, times)
     changes = quantities.parameters(log)
     parameters = ParameterHistory(tuple(changes), _is_whole(unpacked, len(changes)))
-    who = identify(unpacked.tables, unpacked.preface, parameters.latest)
+    values = parameters.latest
+    who = identify(unpacked.tables, unpacked.preface, values)
     readings = quantities.compasses(log)
     current, voltage = quantities.batteries(log)
     attitudes = quantities.attitudes(log)
@@ -95,7 +96,7 @@ def _recording(source: str, unpacked: Unpacked, size: int) -> Recording:
     duration = last_time(times)
     return Recording(
         source=source,
-        vehicle=_vehicle(who, parameters),
+        vehicle=_vehicle(who, values),
         start_unix_s=quantities.unix_start(log),
         duration_s=duration,
         field={number: each.field for number, each in readings.items()},
@@ -131,7 +132,7 @@ def _is_whole(unpacked: Unpacked, count: int) -> bool:
     )
 
 
-def _vehicle(who: Identity, parameters: ParameterHistory) -> Vehicle:
+def _vehicle(who: Identity, values: Mapping[str, float]) -> Vehicle:
     system, component = _ADDRESS
     return Vehicle(
         autopilot=_AUTOPILOT,
@@ -139,7 +140,7 @@ def _vehicle(who: Identity, parameters: ParameterHistory) -> Vehicle:
         system=system,
         component=component,
         firmware=who.firmware,
-        compasses=autopilots.named(_AUTOPILOT).compasses(parameters.latest),
+        compasses=autopilots.named(_AUTOPILOT).compasses(values),
         board=who.board,
         uid=who.uid,
     )
