@@ -49,6 +49,7 @@ GROWTH = (1, 4, 24)
 ROUNDS = 15
 SLOW_ROUNDS = 3
 HOUR_US = 3_600_000_000
+FLIGHT_US = 300_000_000
 
 
 def with_magcomp(path: Path) -> None:
@@ -167,7 +168,7 @@ def tlog_again(data: bytes, times: int) -> bytes:
 
 
 def dataflash_again(data: bytes, times: int) -> bytes:
-    """A clean log several times over, an hour apart, its formats and parameters only once."""
+    """A clean log of less than 5 min several times over, its formats and parameters once."""
     records = []
     kinds: dict[int, tuple[int, str, bytes]] = {128: (89, "FMT", b"")}
     at = 0
@@ -185,7 +186,7 @@ def dataflash_again(data: bytes, times: int) -> bytes:
         for name, letters, record in records:
             if name not in ("FMT", "FMTU", "PARM") and letters.startswith(b"Q"):
                 (stamp,) = struct.unpack_from("<Q", record, 3)
-                rounds.append(record[:3] + struct.pack("<Q", stamp + n * HOUR_US) + record[11:])
+                rounds.append(record[:3] + struct.pack("<Q", stamp + n * FLIGHT_US) + record[11:])
     return b"".join(rounds)
 
 
