@@ -165,7 +165,6 @@ class ConnectScreen(StepScreen):
     def on_resize(self) -> None:
         """Fill the list anew: how many lines a choice has depends on the room."""
         self._choices = ()
-        self.redraw()
 
     def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
         """Connect to a line of the list."""

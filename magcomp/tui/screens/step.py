@@ -77,6 +77,11 @@ class StepScreen(Screen[None]):
             self._bindings_drawn = bindings
             self.refresh_bindings()
 
+    def on_resize(self) -> None:
+        """Draw what depends on the room there is; some keys do."""
+        self._bindings_drawn = None
+        self.redraw()
+
     def on_screen_resume(self) -> None:
         """Draw what changed meanwhile."""
         self.call_after_refresh(self.redraw)
