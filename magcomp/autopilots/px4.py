@@ -24,6 +24,7 @@ from magcomp.model import (
     InForce,
     ParameterHistory,
     Recording,
+    Vehicle,
 )
 
 SLOTS = range(4)
@@ -50,6 +51,7 @@ class Px4:
     switch = COMPENSATION_SWITCH
     compass_prefix = "CAL_MAG"
     device_id_names = tuple(f"CAL_MAG{slot}_ID" for slot in SLOTS)
+    batteries = (0, 1)
     device_ids_describe = "bus, address and type of a sensor, which are alike in vehicles of a kind"
 
     def require_fittable(self, recording: Recording) -> None:
@@ -204,6 +206,10 @@ class Px4:
         if vectors and values.get(COMPENSATION_SWITCH) == 0:
             return (f"{COMPENSATION_SWITCH} stays 0: the compensation will not be in force",)
         return ()
+
+    def multiplied(self, vehicle: Vehicle) -> tuple[str, ...]:  # noqa: ARG002
+        """Thrust and current, whatever the vehicle."""
+        return (CURRENT, THROTTLE)
 
     def how_to_record(self, quantity: str, source_format: str) -> str:  # noqa: ARG002
         """A bit of SDLOG_PROFILE."""

@@ -92,6 +92,7 @@ def _recording(source: str, unpacked: Unpacked, size: int) -> Recording:
     readings = quantities.compasses(log)
     current, voltage = quantities.batteries(log)
     attitudes = quantities.attitudes(log)
+    attitude = next(iter(attitudes), "")
     gyro, accel = quantities.inertial(log)
     duration = last_time(times)
     return Recording(
@@ -107,7 +108,7 @@ def _recording(source: str, unpacked: Unpacked, size: int) -> Recording:
             used=sum(map(len, unpacked.tables.values())),
             skipped=unpacked.skipped,
         ),
-        attitude=next(iter(attitudes.values()), None),
+        attitude=attitudes.get(attitude),
         gyro=gyro,
         accel=accel,
         throttle=quantities.throttle(log, who.kind),
@@ -117,8 +118,10 @@ def _recording(source: str, unpacked: Unpacked, size: int) -> Recording:
         position=quantities.position(log),
         armed=quantities.armed(log, duration),
         format="dataflash",
-        other_currents={number: series for number, series in current.items() if number},
+        other_currents={number: each for number, each in current.items() if number},
         applied=_applied(readings, parameters),
+        attitude_source=attitude,
+        other_attitudes={name: each for name, each in attitudes.items() if name != attitude},
     )
 
 
