@@ -68,7 +68,9 @@ def readings(
     autopilot = autopilots.of(recording)
     applied = recording.applied.get(compass)
     corrected = compass not in recording.raw_compasses
-    changes = autopilot.changes(recording.parameters, told_per_reading=applied is not None)
+    changes = autopilot.changes(
+        recording.parameters, armed=recording.armed, told_per_reading=applied is not None
+    )
     if corrected:
         keep &= _away_from(reported.time, changes)
     keep &= ~_in_gap(reported.time, recording.attitude.time)
@@ -173,7 +175,7 @@ def _corrections(
     in_force: list[InForce] = []
     number = np.empty(len(periods), dtype=np.intp)
     for index, moment in enumerate(moments[periods].tolist()):
-        now = autopilot.in_force_at(recording.parameters, compass, moment)
+        now = autopilot.in_force_at(recording.parameters, compass, moment, armed=recording.armed)
         if not in_force or not _corrects_alike(now, in_force[-1]):
             in_force.append(now)
         number[index] = len(in_force) - 1

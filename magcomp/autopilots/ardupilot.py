@@ -55,6 +55,7 @@ from magcomp.model import (
     InForce,
     ParameterHistory,
     Recording,
+    Series,
     Vehicle,
 )
 
@@ -180,7 +181,11 @@ class ArduPilot:
         return ardupilot_settings.compasses(values)
 
     def changes(
-        self, parameters: ParameterHistory, *, told_per_reading: bool = False
+        self,
+        parameters: ParameterHistory,
+        *,
+        armed: Series | None = None,  # noqa: ARG002
+        told_per_reading: bool = False,
     ) -> tuple[float, ...]:
         """Any report of an acting parameter with another value than before."""
         names = ACTING
@@ -196,7 +201,14 @@ class ArduPilot:
         """Every parameter acts at once, armed or not."""
         return in_force(calibration(values, compass))
 
-    def in_force_at(self, parameters: ParameterHistory, compass: int, time: float) -> InForce:
+    def in_force_at(
+        self,
+        parameters: ParameterHistory,
+        compass: int,
+        time: float,
+        *,
+        armed: Series | None = None,  # noqa: ARG002
+    ) -> InForce:
         """Every parameter acts from its report, armed or not."""
         return in_force(calibration_at(parameters, compass, time), unseen(parameters, compass))
 
@@ -214,6 +226,7 @@ class ArduPilot:
         compass: int,
         values: Mapping[str, float],
         *,
+        regressor: str,  # noqa: ARG002
         soft_iron_fitted: bool,
     ) -> dict[str, float]:
         """COMPASS_OFS, DIA, ODI and MOT; COMPASS_SCALE stays as it is.
@@ -233,7 +246,12 @@ class ArduPilot:
         }
 
     def switch_parameters(
-        self, regressor: str, compasses: Collection[int], values: Mapping[str, float]
+        self,
+        regressor: str,
+        compasses: Collection[int],
+        values: Mapping[str, float],
+        *,
+        battery: int = 0,  # noqa: ARG002
     ) -> dict[str, float]:
         """COMPASS_MOTCT, and zeros for what it would wake."""
         made = {COMPENSATION_SWITCH: float(COMPENSATION_OF[regressor])}
