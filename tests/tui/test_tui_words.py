@@ -58,7 +58,7 @@ async def test_an_unhealthy_compass_has_a_sign_of_its_own(tmp_path):
     session = scripted.ScriptedSession()
     app = scripted.app(tmp_path, session=session)
     async with app.run_test() as pilot:
-        app.session = session
+        app.follow(session)
         app.set_work(made.work(live=True))
         app.action_go("record")
         await until(pilot, lambda: "Compasses" in screen(app))
