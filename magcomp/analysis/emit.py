@@ -44,9 +44,15 @@ def emit(recording: Recording, fits: Sequence[MotorFit]) -> Mapping[int, Emissio
     return {
         fit.compass: Emission(
             accepted={
-                **autopilot.switch_parameters(fit.regressor, fitted, values),
+                **autopilot.switch_parameters(
+                    fit.regressor, fitted, values, battery=recording.battery
+                ),
                 **autopilot.correction_parameters(
-                    fit.correction, fit.compass, values, soft_iron_fitted="diagonal" in fit.free
+                    fit.correction,
+                    fit.compass,
+                    values,
+                    regressor=fit.regressor,
+                    soft_iron_fitted="diagonal" in fit.free,
                 ),
             },
             left_out=autopilot.neutral_parameters(fit.compass, fit.regressor, values),

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from magcomp.mavlink import stream
 from magcomp.model import Recording
-from magcomp.sources import dataflash, tlog
+from magcomp.sources import dataflash, tlog, ulog
 from magcomp.sources.source import is_text
 from magcomp.sources.vehicles import Choice
 
@@ -150,15 +150,13 @@ FORMATS: tuple[Format, ...] = (
         dataflash.recognises_text,
         of_one_vehicle(dataflash.read_dataflash),
     ),
+    Format("ulog", "a PX4 log (.ulg)", ulog.recognises, of_one_vehicle(ulog.read_ulog)),
     Format("tlog", "a telemetry log (.tlog)", tlog.recognises, tlog.read_chosen, signed=False),
 )
 """Every format that is read, in the order in which they are asked."""
 
-_NOT_YET = "give the .tlog of the same flight; this kind cannot be read yet"
-
 OTHERS: tuple[Other, ...] = (
     Other("an empty file", "copy it again from where it came", lambda head: not head),
-    Other("a PX4 log (.ulg)", _NOT_YET, _begins(b"ULog\x01\x12\x35"), is_log=True),
     Other(
         "raw MAVLink without times (.rlog)",
         "give the .tlog that the ground station wrote beside it",

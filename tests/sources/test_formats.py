@@ -13,6 +13,7 @@ from dataflash_writer import short_flight as short_flight_of_dataflash
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tlog_writer import RECORDINGS, Sender, log, short_flight
+from ulog_writer import short_flight as short_flight_of_ulog
 
 from magcomp.errors import ChooseVehicleError, LogError, MagcompError
 from magcomp.model import Recording
@@ -25,10 +26,15 @@ TLOG = log(short_flight(Sender()))
 RLOG = b"".join(short_flight(Sender()))
 TEXT_LOG = b"9\r\n\r\nArduCopter V3.1\r\nFMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format\r\n"
 BIN = short_flight_of_dataflash().binary()
-LOGS = {"dataflash": BIN, "dataflash in text": short_flight_of_dataflash().text(), "tlog": TLOG}
+ULG = short_flight_of_ulog().binary()
+LOGS = {
+    "dataflash": BIN,
+    "dataflash in text": short_flight_of_dataflash().text(),
+    "ulog": ULG,
+    "tlog": TLOG,
+}
 OTHER = {
     "an empty file": b"",
-    "a PX4 log (.ulg)": b"ULog\x01\x12\x35\x01" + bytes(100),
     "raw MAVLink without times (.rlog)": RLOG,
     "an archive that magcomp does not open": b"7z\xbc\xaf\x27\x1c\0\4" + bytes(100),
     "a Git-LFS pointer": b"version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 9\n",
@@ -182,7 +188,7 @@ def test_a_zip_of_several_logs_is_refused_by_their_names(tmp_path: Path) -> None
         ({"a" * 300: b"x"}, "a" * 59 + "…)"),
         ({f"{n}.txt": b"x" for n in range(9)}, "(0.txt, 1.txt, 2.txt, 3.txt, 4.txt …)"),
         ({f"{n}": b"" for n in range(MOST_FILES + 1)}, f"holds {MOST_FILES + 1} files"),
-        ({"flight.ulg": OTHER["a PX4 log (.ulg)"]}, "a PX4 log (.ulg)"),
+        ({"flight.rlog": OTHER["raw MAVLink without times (.rlog)"]}, "raw MAVLink without times"),
     ],
 )
 def test_a_zip_without_a_log_is_refused(
