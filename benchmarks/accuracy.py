@@ -1,9 +1,10 @@
 """What the emitted parameters leave of heading error, against the truth beside each recording.
 
-For every NAME.tlog with a NAME.json (sitl_fixtures/ by default): the largest heading error at any
-current 0 … 50 A, over all yaws, level and tilted 20°, of each compass, and the 95 % bound that
-magcomp itself states. Sweeps: the error of the interference vector; where only the throttle was
-recorded, against the vector times the 120 A that full throttle drew (recordings README).
+For every NAME.tlog and NAME.BIN with a NAME.json (sitl_fixtures/ by default): the largest heading
+error at any current 0 … 50 A, over all yaws, level and tilted 20°, of each compass, and the 95 %
+bound that magcomp itself states. Sweeps: the error of the interference vector; where only the
+throttle was recorded, against the vector times the 120 A that full throttle drew (recordings
+README).
 
     python benchmarks/accuracy.py [FOLDER]
 """
@@ -50,8 +51,9 @@ def vector_error(log: Path, result: CompassResult) -> str:
 
 def main() -> None:
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else FIXTURES
-    print(f"{'recording':<24}{'method':<8}{'by':<9} compass 1, 2, 3")
-    for log in sorted(folder.glob("*.tlog")):
+    print(f"{'recording':<28}{'method':<8}{'by':<9} compass 1, 2, 3")
+    logs = (path for path in folder.iterdir() if path.suffix in {".tlog", ".BIN"})
+    for log in sorted(logs):
         if not log.with_suffix(".json").exists():
             continue
         recording = read(log)
@@ -65,7 +67,7 @@ def main() -> None:
             for result in results
         ]
         fit = results[0].fit
-        print(f"{log.stem:<24}{fit.method:<8}{fit.regressor:<9} {', '.join(cells)}")
+        print(f"{log.name:<28}{fit.method:<8}{fit.regressor:<9} {', '.join(cells)}")
 
 
 if __name__ == "__main__":

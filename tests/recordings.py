@@ -32,3 +32,7 @@ def result(name: str, compass: int) -> CompassResult:
 def of_fixture(name: str) -> truth.Truth:
     """The vehicle as it really was."""
     return truth.of_fixture(name, recording(name).start_unix_s)
+
+
+REAL_LOGS = sorted(truth.REAL.glob("*")) if truth.REAL.is_dir() else []
+"""Logs of real vehicles, where the folder beside the repository is."""

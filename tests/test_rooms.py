@@ -14,7 +14,7 @@ PACKAGE = Path(__file__).parents[1] / "magcomp"
 OWN_ROOMS = ("autopilots", "simulate")
 
 # A log format is a firmware's own, and its reader says so.
-FORMATS = re.compile(r"sources/(dataflash|ulog|formats)\w*\.py")
+FORMATS = re.compile(r"sources/(dataflash|ulog|formats)\w*(/\w+)?\.py")
 
 FIRMWARE = re.compile(r"ardupilot|arducopter|px4", re.IGNORECASE)
 PARAMETER = re.compile(r"COMPASS_[A-Z]|CAL_MAG|\bMOT_[A-Z]|\bBATT_[A-Z]|\bSERVO\w*_FUNCTION")

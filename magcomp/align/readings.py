@@ -63,12 +63,14 @@ def readings(
             f"{recording.source} must hold the vehicle's attitude (message ATTITUDE); "
             "instead it holds none, and gravity cannot be known without it"
         )
-    keep = _is_new(reported.value)
+    keep = is_new(reported.value)
     keep &= (reported.time >= start) & (reported.time <= end)
     autopilot = autopilots.of(recording)
     applied = recording.applied.get(compass)
     corrected = compass not in recording.raw_compasses
-    changes = autopilot.changes(recording.parameters, told_per_reading=applied is not None)
+    changes = autopilot.changes(
+        recording.parameters, armed=recording.armed, told_per_reading=applied is not None
+    )
     if corrected:
         keep &= _away_from(reported.time, changes)
     keep &= ~_in_gap(reported.time, recording.attitude.time)
@@ -111,7 +113,8 @@ def _list_compasses(recording: Recording) -> str:
     return f"compass {', '.join(map(str, present))}" if present else "no compass at all"
 
 
-def _is_new(value: FloatArray) -> BoolArray:
+def is_new(value: FloatArray) -> BoolArray:
+    """Whether each reading, shape (n, 3), differs from the one before it; shape (n,)."""
     changed = np.any(np.diff(value, axis=0) != 0.0, axis=1)
     return np.concatenate([[True], changed])
 
@@ -172,7 +175,7 @@ def _corrections(
     in_force: list[InForce] = []
     number = np.empty(len(periods), dtype=np.intp)
     for index, moment in enumerate(moments[periods].tolist()):
-        now = autopilot.in_force_at(recording.parameters, compass, moment)
+        now = autopilot.in_force_at(recording.parameters, compass, moment, armed=recording.armed)
         if not in_force or not _corrects_alike(now, in_force[-1]):
             in_force.append(now)
         number[index] = len(in_force) - 1

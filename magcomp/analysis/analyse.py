@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,6 +11,8 @@ from magcomp import autopilots
 from magcomp.align import controls, expected_earth, has_position, readings, reported
 from magcomp.align.health import compass_complaints, current_complaints
 from magcomp.analysis.emit import Emission, emit
+from magcomp.analysis.multiplied import kinds_to_try, multiplied_notes, why_only_to_look_at
+from magcomp.analysis.vehicle_words import in_words_of
 from magcomp.earth import EarthField
 from magcomp.errors import MissingDataError, UsageError
 from magcomp.fit import METHODS, Problem, best_form, fit
@@ -104,10 +106,10 @@ def analyse(
         Where every compass asked for has a parameter that is not finite.
     """
     wanted = Options() if options is None else options
+    compasses = _compasses(recording, wanted)
     found = _controls_of(recording)
     kinds = _kinds(recording, found, wanted)
     earth = expected_earth(recording)
-    compasses = _compasses(recording, wanted)
     steps = len(kinds) * len(compasses)
     judged: dict[str, list[_Judged]] = {}
     for kind in kinds:
@@ -121,14 +123,21 @@ def analyse(
     chosen = _choose(judged)
     emitted = emit(recording, [j.fit for j in judged[chosen]])
     nothing = all(j.verdict.grade is Grade.REJECTED for j in judged[chosen])
+    why_not = why_only_to_look_at(recording, chosen)
     return Analysis(
         source=recording.source,
         duration_s=recording.duration_s,
         vehicle=recording.vehicle,
         compasses=tuple(
-            _result(j, emitted[j.fit.compass], nothing_accepted=nothing) for j in judged[chosen]
+            _result(
+                j,
+                Emission({}, {}) if why_not else emitted[j.fit.compass],
+                nothing_accepted=nothing,
+            )
+            for j in judged[chosen]
         ),
         notes=tuple(_notes(recording, wanted, judged, chosen)),
+        only_to_look_at=why_not,
     )
 
 
@@ -154,11 +163,12 @@ def check(recording: Recording, options: Options | None = None) -> Mapping[int, 
         As :func:`analyse`.
     """
     wanted = Options() if options is None else options
+    compasses = _compasses(recording, wanted)
     found = _controls_of(recording)
     earth = expected_earth(recording)
     by_kind = reported(found)
     verdicts = {}
-    for compass in _compasses(recording, wanted):
+    for compass in compasses:
         new = readings(recording, compass, start=wanted.start, end=wanted.end)
         kind = new.in_force[-1].regressor or found[0].kind
         if kind not in by_kind:
@@ -166,7 +176,9 @@ def check(recording: Recording, options: Options | None = None) -> Mapping[int, 
                 f"Compass {compass} is corrected by {kind}, so {recording.source} must hold the "
                 f"{kind}; instead it holds {', '.join(by_kind)}"
             )
-        verdicts[compass] = judge_present(Problem(new, by_kind[kind], by_kind, earth))
+        verdicts[compass] = _in_words_of(
+            recording, judge_present(Problem(new, by_kind[kind], by_kind, earth))
+        )
     return verdicts
 
 
@@ -203,7 +215,12 @@ def _one(
     if problem.control.kind == CURRENT:
         complaints += current_complaints(recording)
     found, verdict = judge(problem, fit(problem, wanted.method), complaints=complaints)
-    return _Judged(problem, found, verdict)
+    return _Judged(problem, found, _in_words_of(recording, verdict))
+
+
+def _in_words_of(recording: Recording, verdict: Verdict) -> Verdict:
+    kind = recording.vehicle.kind
+    return replace(verdict, reasons=tuple(in_words_of(kind, each) for each in verdict.reasons))
 
 
 def _controls_of(recording: Recording) -> tuple[Control, ...]:
@@ -211,16 +228,23 @@ def _controls_of(recording: Recording) -> tuple[Control, ...]:
     if not found:
         raise MissingDataError(
             f"{recording.source} must hold a battery current or a throttle that changes; instead "
-            "it holds neither: was the vehicle ever armed?"
+            f"it holds {_silent_controls(recording)}"
         )
     return found
+
+
+def _silent_controls(recording: Recording) -> str:
+    if recording.current is None and recording.throttle is None:
+        how = autopilots.of(recording).how_to_record("control", recording.format)
+        return f"neither: {how}"
+    return "neither: was the vehicle ever armed?"
 
 
 def _kinds(recording: Recording, found: Iterable[Control], wanted: Options) -> list[str]:
     """The control quantities to try, the reported ones first."""
     kinds = list(dict.fromkeys(control.kind for control in found))
     if wanted.regressor == "auto":
-        return kinds
+        return kinds_to_try(recording, kinds)
     if wanted.regressor not in kinds:
         raise MissingDataError(
             f"{recording.source} must hold a {wanted.regressor} that changes; instead it holds "
@@ -235,8 +259,8 @@ def _compasses(recording: Recording, wanted: Options) -> list[int]:
     autopilot.require_fittable(recording)
     if not recording.field:
         raise MissingDataError(
-            f"{recording.source} must hold readings of a compass (RAW_IMU, SCALED_IMU2 or "
-            "SCALED_IMU3); instead it holds none"
+            f"{recording.source} must hold readings of a compass; instead it holds none: "
+            f"{autopilot.how_to_record('compass', recording.format)}"
         )
     asked = sorted(recording.field) if wanted.compass is None else [wanted.compass]
     left_out = autopilot.left_out(recording.parameters)
@@ -283,11 +307,7 @@ def _notes(
         yield "the log holds no battery current, so throttle is used"
     if not has_position(recording):
         yield "the log holds no position: the earth's field is taken from the readings themselves"
-    if recording.vehicle.kind not in ("copter", "unknown"):
-        yield (
-            f"the vehicle is a {recording.vehicle.kind}: magcomp is made for multirotors, whose "
-            "thrust demand is the throttle the autopilot multiplies"
-        )
+    yield from multiplied_notes(recording, chosen)
     autopilot = autopilots.of(recording)
     yield from autopilot.warnings(recording.parameters.latest)
     for compass, why in sorted(autopilot.left_out(recording.parameters).items()):

@@ -43,10 +43,12 @@ def emit(recording: Recording, fits: Sequence[MotorFit]) -> Mapping[int, Emissio
     values = recording.parameters.latest
     fitted = [fit.compass for fit in fits]
     changed = not all(fit.kept for fit in fits)
+    regressor = fits[0].regressor
+    switch = autopilot.switch_parameters(regressor, fitted, values, battery=recording.battery)
     return {
         fit.compass: Emission(
             accepted={
-                **(autopilot.switch_parameters(fit.regressor, fitted, values) if changed else {}),
+                **(switch if changed else {}),
                 **_of_correction(autopilot, fit, values, in_force=not changed),
             },
             left_out=autopilot.neutral_parameters(fit.compass, fit.regressor, values),
@@ -63,6 +65,7 @@ def _of_correction(
         fit.correction,
         fit.compass,
         values,
+        regressor=fit.regressor,
         soft_iron_fitted="diagonal" in fit.free and not fit.kept,
     )
     if not fit.kept:

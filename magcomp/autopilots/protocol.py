@@ -14,7 +14,16 @@ from typing import Protocol
 import numpy as np
 
 from magcomp.errors import InputError
-from magcomp.model import Compass, Correction, FloatArray, InForce, ParameterHistory, Recording
+from magcomp.model import (
+    Compass,
+    Correction,
+    FloatArray,
+    InForce,
+    ParameterHistory,
+    Recording,
+    Series,
+    Vehicle,
+)
 
 
 class Kind(IntEnum):
@@ -188,6 +197,11 @@ class Autopilot(Protocol):
         ...
 
     @property
+    def batteries(self) -> tuple[int, ...]:
+        """Battery instances whose current the firmware can multiply."""
+        ...
+
+    @property
     def device_ids_describe(self) -> str:
         """What a device id says, in words, where it does not tell one vehicle from its twin."""
         ...
@@ -231,12 +245,18 @@ class Autopilot(Protocol):
         ...
 
     def changes(
-        self, parameters: ParameterHistory, *, told_per_reading: bool = False
+        self,
+        parameters: ParameterHistory,
+        *,
+        armed: Series | None = None,
+        told_per_reading: bool = False,
     ) -> tuple[float, ...]:
         """Times at which anything that acts on a reading changed, in order.
 
         Parameters
         ----------
+        armed
+            1 armed, 0 disarmed, where known: a firmware may take values over only while disarmed.
         told_per_reading
             The log tells offset and motor correction with every reading, so that changes of
             these two do not count.
@@ -247,7 +267,14 @@ class Autopilot(Protocol):
         """What given parameters do to a compass; nothing counts as unseen."""
         ...
 
-    def in_force_at(self, parameters: ParameterHistory, compass: int, time: float) -> InForce:
+    def in_force_at(
+        self,
+        parameters: ParameterHistory,
+        compass: int,
+        time: float,
+        *,
+        armed: Series | None = None,
+    ) -> InForce:
         """What was in force at a time, in seconds; −∞ is the beginning.
 
         Raises
@@ -271,6 +298,7 @@ class Autopilot(Protocol):
         compass: int,
         values: Mapping[str, float],
         *,
+        regressor: str,
         soft_iron_fitted: bool,
     ) -> dict[str, float]:
         """Parameters that make this vehicle apply a correction.
@@ -279,15 +307,28 @@ class Autopilot(Protocol):
         ----------
         values
             Every parameter known of the vehicle; what its firmware does not have is left out.
+        regressor
+            The control quantity that the motor vector is multiplied by.
         soft_iron_fitted
             The soft iron is not the one in force, so it belongs to the offsets.
         """
         ...
 
     def switch_parameters(
-        self, regressor: str, compasses: Collection[int], values: Mapping[str, float]
+        self,
+        regressor: str,
+        compasses: Collection[int],
+        values: Mapping[str, float],
+        *,
+        battery: int = 0,
     ) -> dict[str, float]:
-        """The switch, and zeros for the stored vectors it would wake on all other compasses."""
+        """The switch, and zeros for the stored vectors it would wake on all other compasses.
+
+        Parameters
+        ----------
+        battery
+            Instance of the battery whose current it is.
+        """
         ...
 
     def neutral_parameters(
@@ -323,6 +364,23 @@ class Autopilot(Protocol):
             What shall be written.
         values
             What the vehicle will hold afterwards.
+        """
+        ...
+
+    def multiplied(self, vehicle: Vehicle) -> tuple[str, ...]:
+        """The control quantities that the firmware of a kind of vehicle can multiply."""
+        ...
+
+    def how_to_record(self, quantity: str, source_format: str) -> str:
+        """What to set so that the next recording of a format holds a quantity.
+
+        Parameters
+        ----------
+        quantity
+            ``"compass"``, ``"control"`` (current and throttle), ``"current"``, ``"all currents"``
+            (of several batteries as one), ``"attitude"``, ``"parameters"`` or ``"position"``.
+        source_format
+            As in ``Recording.format``.
         """
         ...
 

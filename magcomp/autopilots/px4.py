@@ -1,43 +1,68 @@
-"""PX4: its names. What it does to a reading is not known here yet, and is refused in words."""
+"""PX4: every fact of it that magcomp needs (release/1.12 to 1.17)."""
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Collection, Mapping
-from typing import NoReturn
+from dataclasses import replace
 
+import numpy as np
+
+from magcomp.autopilots import px4_settings
 from magcomp.autopilots.protocol import (
     FieldMeaning,
-    Kind,
     LagPrior,
     LagPriors,
     MotorOutputs,
     ParameterName,
+    ThrustCurve,
 )
+from magcomp.autopilots.px4_correction import (
+    REGRESSOR_OF,
+    Calibration,
+    Compensation,
+    after_start,
+    behind,
+    compensation_of,
+    in_force,
+    offset_zone,
+    sensor_calibration,
+    stored,
+    stretches,
+    unseen,
+)
+from magcomp.autopilots.px4_emission import noticed
+from magcomp.autopilots.px4_names import (
+    COMPENSATION_SWITCH,
+    integer_type,
+    parse,
+    single_name,
+    vector_names,
+)
+from magcomp.autopilots.px4_rotation import sensor_to_body
+from magcomp.autopilots.px4_settings import NUMBERS
 from magcomp.errors import InputError, MissingDataError
 from magcomp.model import (
     CURRENT,
     THROTTLE,
     Compass,
     Correction,
+    FloatArray,
     InForce,
     ParameterHistory,
     Recording,
+    Series,
+    Vehicle,
 )
 
-SLOTS = range(4)
-COMPENSATION_SWITCH = "CAL_MAG_COMP_TYP"
+FIRST_VERSION = (1, 12)
+"""Before it the correction was another one, or there was none."""
 
-_VECTORS = {
-    "COMP": Kind.MOTOR,
-    "OFF": Kind.OFFSET,
-    "SCALE": Kind.DIAGONAL,
-    "ODIAG": Kind.OFF_DIAGONAL,
-}
-_VECTOR = re.compile(r"CAL_MAG([0-3])_([XYZ])(OFF|SCALE|ODIAG|COMP)")
-_SINGLE = re.compile(r"CAL_MAG([0-3])_(ID|ROT|PRIO)")
-_INT32 = 6  # MAV_PARAM_TYPE
+_THRUST_CURVE = "THR_MDL_FAC"
+_LOW, _HIGH = 1000.0, 2000.0
+_LOGGED = LagPriors(LagPrior(0.0, 0.05), LagPrior(0.0, 0.1))
+"""A log stamps a reading with the moment of measurement."""
+_LINK = LagPriors(LagPrior(0.0, 0.1), LagPrior(0.0, 0.1))
 
 
 class Px4:
@@ -49,12 +74,30 @@ class Px4:
     integers_as_bytes = True
     switch = COMPENSATION_SWITCH
     compass_prefix = "CAL_MAG"
-    device_id_names = tuple(f"CAL_MAG{slot}_ID" for slot in SLOTS)
+    device_id_names = tuple(single_name("ID", number) for number in NUMBERS)
+    batteries = (0, 1)
     device_ids_describe = "bus, address and type of a sensor, which are alike in vehicles of a kind"
 
     def require_fittable(self, recording: Recording) -> None:
-        """Refuse: the correction is not known."""
-        raise self._unknown(recording.source)
+        """Refuse firmware before 1.12, and recordings without the compasses' parameters."""
+        version = recording.vehicle.firmware
+        numbers = tuple(int(part) for part in re.findall(r"\d+", version)[:2])
+        if numbers and numbers < FIRST_VERSION:
+            raise MissingDataError(
+                f"{recording.source} must be of {self.title} 1.12 or newer; instead it is of "
+                f"{version}, which corrects its compasses in another way or not at all: update "
+                "the vehicle, calibrate it and record again"
+            )
+        if COMPENSATION_SWITCH not in recording.parameters.names:
+            raise MissingDataError(
+                f"{recording.source} must tell the vehicle's {COMPENSATION_SWITCH}; instead it "
+                + (
+                    "holds no parameters: give the .ulg of the same flight"
+                    if not recording.parameters.names
+                    else "does not, so its firmware is older than 1.12 or its parameters are not "
+                    "whole: give the .ulg of a newer firmware"
+                )
+            )
 
     def field_meaning(self, source_format: str) -> FieldMeaning:
         """On the link whole mGauss, in the log floats."""
@@ -62,158 +105,161 @@ class Px4:
 
     def lag_priors(self, source_format: str) -> LagPriors:
         """The log stamps a reading with the mean time of what it is made of."""
-        width = 0.05 if source_format == "ulog" else 0.1
-        return LagPriors(LagPrior(0.0, width), LagPrior(0.0, 0.1))
+        return _LOGGED if source_format == "ulog" else _LINK
 
-    def motor_outputs(
-        self,
-        parameters: ParameterHistory,  # noqa: ARG002
-        outputs: int,  # noqa: ARG002
-    ) -> MotorOutputs | None:
-        """Not known."""
-        return None
+    def motor_outputs(self, parameters: ParameterHistory, outputs: int) -> MotorOutputs | None:
+        """All that are driven; THR_MDL_FAC says how far thrust goes with their square."""
+        factor = float(np.clip(parameters.last(_THRUST_CURVE, 0.0), 0.0, 1.0))
+        curve = ThrustCurve(factor if np.isfinite(factor) else 0.0, 0.0, 1.0)
+        return MotorOutputs(tuple(range(outputs)), _LOW, _HIGH, curve)
 
     def parse(self, name: str) -> ParameterName | None:
         """Take a name apart; slot 0 is compass 1."""
-        if name == COMPENSATION_SWITCH:
-            return ParameterName(Kind.SWITCH, 0, name)
-        if vector := _VECTOR.fullmatch(name):
-            whole = f"CAL_MAG{vector[1]}_{vector[3]}"
-            return ParameterName(_VECTORS[vector[3]], int(vector[1]) + 1, whole, vector[2])
-        if single := _SINGLE.fullmatch(name):
-            kind = Kind.DEVICE if single[2] == "ID" else Kind.SETTING
-            return ParameterName(kind, int(single[1]) + 1, name)
-        return None
+        return parse(name)
 
     def integer_type(self, name: str) -> int | None:
         """INT32 for all that hold whole numbers."""
-        found = self.parse(name)
-        if found is None or found.kind not in (Kind.SWITCH, Kind.DEVICE, Kind.SETTING):
-            return None
-        return _INT32
+        return integer_type(name)
 
     def choices(self, name: str) -> tuple[int, ...]:
         """CAL_MAG_COMP_TYP is off, by thrust, or by the current of battery 0 or 1."""
-        return (0, 1, 2, 3) if name == COMPENSATION_SWITCH else ()
+        return tuple(Compensation) if name == COMPENSATION_SWITCH else ()
 
     def compasses(self, values: Mapping[str, float]) -> tuple[Compass, ...]:
-        """By CAL_MAGn_ID; CAL_MAGn_ROT is −1 for internal ones, CAL_MAGn_PRIO 0 for unused ones."""
-        found = []
-        for slot, name in zip(SLOTS, self.device_id_names, strict=True):
-            device = values.get(name, 0.0)
-            if math.isfinite(device) and device:
-                rotation = values.get(f"CAL_MAG{slot}_ROT")
-                priority = values.get(f"CAL_MAG{slot}_PRIO")
-                found.append(
-                    Compass(
-                        slot=slot + 1,
-                        device_id=int(device),
-                        external=None if rotation is None else rotation >= 0,
-                        orientation=None if rotation is None or rotation < 0 else int(rotation),
-                        used=None if priority is None else priority != 0,
-                    )
-                )
-        return tuple(found)
+        """By CAL_MAGn_ID."""
+        return px4_settings.compasses(values)
 
     def changes(
         self,
-        parameters: ParameterHistory,  # noqa: ARG002
+        parameters: ParameterHistory,
         *,
+        armed: Series | None = None,
         told_per_reading: bool = False,  # noqa: ARG002
     ) -> tuple[float, ...]:
-        """Not known."""
-        return self._refuse()
+        """Times at which something else came into force, which is later than it was set."""
+        return tuple(
+            sorted(
+                {time for n in NUMBERS for time, _ in stretches(parameters, n, armed)[1:]},
+            )
+        )
 
-    def in_force(self, values: Mapping[str, float], compass: int) -> InForce:  # noqa: ARG002
-        """Not known."""
-        return self._refuse()
+    def in_force(self, values: Mapping[str, float], compass: int) -> InForce:
+        """As after a start with these values."""
+        return in_force(after_start(values, compass), sensor_to_body(values, compass))
 
     def in_force_at(
         self,
-        parameters: ParameterHistory,  # noqa: ARG002
-        compass: int,  # noqa: ARG002
-        time: float,  # noqa: ARG002
+        parameters: ParameterHistory,
+        compass: int,
+        time: float,
+        *,
+        armed: Series | None = None,
     ) -> InForce:
-        """Not known."""
-        return self._refuse()
+        """What of the parameters had been taken over."""
+        found = stretches(parameters, compass, armed)
+        now = next(calibration for since, calibration in reversed(found) if since <= time)
+        rotation = sensor_to_body(parameters.latest, compass)
+        return in_force(now, rotation, unseen(parameters, compass))
 
     def regressor(self, values: Mapping[str, float]) -> str | None:
-        """By thrust or by the current of the first battery; no other is a quantity here."""
-        return {1.0: THROTTLE, 2.0: CURRENT}.get(values.get(COMPENSATION_SWITCH, 0.0))
+        """CAL_MAG_COMP_TYP serves all compasses; values that the firmware does not know are off."""
+        return REGRESSOR_OF.get(stored(values, 1).compensation)
 
-    def left_out(self, parameters: ParameterHistory) -> Mapping[int, InputError]:  # noqa: ARG002
-        """None by itself."""
-        return {}
+    def left_out(self, parameters: ParameterHistory) -> Mapping[int, InputError]:
+        """Compasses with a value that is none, or without a slot."""
+        return px4_settings.left_out(parameters)
 
     def correction_parameters(
         self,
-        correction: Correction,  # noqa: ARG002
-        compass: int,  # noqa: ARG002
-        values: Mapping[str, float],  # noqa: ARG002
+        correction: Correction,
+        compass: int,
+        values: Mapping[str, float],
         *,
-        soft_iron_fitted: bool,  # noqa: ARG002
+        regressor: str,
+        soft_iron_fitted: bool,
     ) -> dict[str, float]:
-        """Not known."""
-        return self._refuse()
+        """COMP and OFF, and SCALE and ODIAG where fitted, such that the firmware notices them."""
+        rotation = sensor_to_body(values, compass)
+        present = after_start(values, compass)
+        wanted = sensor_calibration(correction, rotation, compensation_of(regressor, 0))
+        if not soft_iron_fitted:
+            wanted = _with_shape(wanted, present)
+        made = noticed(wanted, present, offset_zone(values), rotation)
+        found = _vector("COMP", compass, made.motor) | _vector("OFF", compass, made.offset)
+        if soft_iron_fitted:
+            found |= _vector("SCALE", compass, made.scale)
+            found |= _vector("ODIAG", compass, made.off_diagonal)
+        return found
 
     def switch_parameters(
         self,
-        regressor: str,  # noqa: ARG002
-        compasses: Collection[int],  # noqa: ARG002
-        values: Mapping[str, float],  # noqa: ARG002
+        regressor: str,
+        compasses: Collection[int],
+        values: Mapping[str, float],
+        *,
+        battery: int = 0,
     ) -> dict[str, float]:
-        """Not known."""
-        return self._refuse()
+        """CAL_MAG_COMP_TYP, and zeros for what it would wake."""
+        made = {COMPENSATION_SWITCH: float(compensation_of(regressor, battery))}
+        for compass in NUMBERS:
+            woken = any(values.get(name, 0.0) for name in vector_names("COMP", compass))
+            if compass not in compasses and woken:
+                made |= self.neutral_parameters(compass, regressor, values)
+        return made
 
     def neutral_parameters(
-        self,
-        compass: int,  # noqa: ARG002
-        regressor: str,  # noqa: ARG002
-        values: Mapping[str, float],  # noqa: ARG002
+        self, compass: int, regressor: str, values: Mapping[str, float]
     ) -> dict[str, float]:
-        """Not known."""
-        return self._refuse()
+        """COMP of zeros, unless it is in force for the same quantity already."""
+        if self.regressor(values) == regressor:
+            return {}
+        return _vector("COMP", compass, np.zeros(3))
 
     def relevant_names(self) -> tuple[str, ...]:
-        """The switch, and each slot's id and vectors."""
-        vectors = (f"CAL_MAG{n}_{axis}{kind}" for n in SLOTS for kind in _VECTORS for axis in "XYZ")
-        return (COMPENSATION_SWITCH, *self.device_id_names, *vectors)
+        """The switch, and each slot's id, rotation, priority and vectors."""
+        return px4_settings.relevant_names()
 
     def useful_names(self) -> tuple[str, ...]:
-        """None known."""
-        return ()
+        """How the board and the compasses are turned, and the thrust curve."""
+        return (*px4_settings.turning_names(), _THRUST_CURVE)
 
     def output_names(self) -> tuple[str, ...]:
-        """None known."""
+        """None: the log says by itself which outputs are motors."""
         return ()
 
-    def warnings(self, values: Mapping[str, float]) -> tuple[str, ...]:  # noqa: ARG002
-        """None known."""
-        return ()
+    def warnings(self, values: Mapping[str, float]) -> tuple[str, ...]:
+        """Of CAL_MAG_COMP_TYP, PRIO and ROT."""
+        return tuple(px4_settings.warnings(values))
 
     def write_warnings(
         self,
         asked: Mapping[str, float],
         values: Mapping[str, float],
     ) -> tuple[str, ...]:
-        """Of vectors without their switch."""
-        vectors = any(
-            value and (found := self.parse(name)) is not None and found.kind is Kind.MOTOR
-            for name, value in asked.items()
-        )
-        if vectors and values.get(COMPENSATION_SWITCH) == 0:
-            return (f"{COMPENSATION_SWITCH} stays 0: the compensation will not be in force",)
-        return ()
+        """Of vectors without their switch, and of a restart."""
+        return tuple(px4_settings.write_warnings(asked, values))
+
+    def multiplied(self, vehicle: Vehicle) -> tuple[str, ...]:  # noqa: ARG002
+        """Thrust and current, whatever the vehicle."""
+        return (CURRENT, THROTTLE)
+
+    def how_to_record(self, quantity: str, source_format: str) -> str:  # noqa: ARG002
+        """A bit of SDLOG_PROFILE."""
+        return f"set SDLOG_PROFILE to 1, which logs the {quantity}, and fly again"
 
     def no_compass_hint(self) -> str:
         """Telemetry sends no compass by itself."""
         return "does the link carry SCALED_IMU?"
 
-    def _unknown(self, source: str) -> MissingDataError:
-        return MissingDataError(
-            f"{source} must be of a vehicle with ArduPilot; instead it is of one with "
-            f"{self.title}, whose compass correction is not known yet"
-        )
 
-    def _refuse(self) -> NoReturn:
-        raise self._unknown("The recording")
+def _vector(kind: str, compass: int, vector: FloatArray) -> dict[str, float]:
+    return {
+        name: float(np.float32(value))
+        for name, value in zip(vector_names(kind, compass), vector, strict=True)
+    }
+
+
+def _with_shape(wanted: Calibration, present: Calibration) -> Calibration:
+    """The same motor vector behind the soft iron that is in force."""
+    shaped = replace(wanted, scale=present.scale, off_diagonal=present.off_diagonal)
+    return replace(shaped, motor=behind(shaped, wanted.soft_iron @ wanted.motor))

@@ -310,6 +310,9 @@ class Analysis:
         One result a compass, in order.
     notes
         What a user should know of the recording: what was missing, what was left out.
+    only_to_look_at
+        Why no parameters follow from it, whatever the verdict: the firmware cannot multiply what
+        it was fitted against. Empty where it can.
     """
 
     source: str
@@ -317,6 +320,7 @@ class Analysis:
     vehicle: Vehicle
     compasses: tuple[CompassResult, ...]
     notes: tuple[str, ...]
+    only_to_look_at: str = ""
 
     @property
     def grade(self) -> Grade:

@@ -250,7 +250,7 @@ class Recording:
     throttle
         Thrust demand 0 … 1 as the autopilot reports it, shape (n,).
     current, voltage
-        Battery instance 0 in A and V, shape (n,); absent readings are left out.
+        Battery instance ``battery`` in A and V, shape (n,); absent readings are left out.
     outputs
         Servo outputs in microseconds, shape (n, 16); 0 where not driven.
     position
@@ -260,13 +260,19 @@ class Recording:
     format
         What it was read from: ``"tlog"``, ``"live"``, ``"dataflash"`` or ``"ulog"``. How late a
         quantity is depends on it.
+    battery
+        Battery instance that ``current`` and ``voltage`` are of.
     other_currents
-        Battery instance (1, 2, …) to its current in A, where there is more than one battery.
+        Instance of each other battery to its current in A.
     applied
         Compass number to what the log says was applied to its readings, where it says so
         (dataflash does); empty where only parameters tell.
     raw_compasses
         Compasses whose ``field`` is the sensor's own, turned into body axes and not corrected.
+    attitude_source
+        Message that ``attitude`` is from; empty where there is none.
+    other_attitudes
+        Messages that tell the attitude too, the better ones first, to what they tell.
     """
 
     source: str
@@ -286,6 +292,9 @@ class Recording:
     position: Series | None = None
     armed: Series | None = None
     format: str = "tlog"
+    battery: int = 0
     other_currents: Mapping[int, Series] = dataclasses.field(default_factory=dict)
     applied: Mapping[int, Applied] = dataclasses.field(default_factory=dict)
     raw_compasses: frozenset[int] = frozenset()
+    attitude_source: str = ""
+    other_attitudes: Mapping[str, Series] = dataclasses.field(default_factory=dict)

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from magcomp.mavlink import stream
 from magcomp.model import Recording
-from magcomp.sources import tlog
+from magcomp.sources import dataflash, tlog, ulog
 from magcomp.sources.source import is_text
 from magcomp.sources.vehicles import Choice
 
@@ -37,12 +37,15 @@ class Format:
         Tells from the first ``HEAD`` bytes, or all there are, whether a file is of this kind.
     read
         Reads a file, where there are several vehicles the one chosen.
+    signed
+        Whether its beginning is a signature, which nothing in ``OTHERS`` has too.
     """
 
     name: str
     title: str
     recognises: Callable[[bytes], bool]
     read: Callable[[Path, Choice, Progress | None], Recording]
+    signed: bool = True
 
 
 @dataclass(frozen=True)
@@ -85,6 +88,8 @@ def format_of(head: bytes) -> Format | None:
 
 def other_of(head: bytes) -> Other | None:
     """What a file is instead of a log that can be read; None where nobody knows it."""
+    if any(each.signed and each.recognises(head) for each in FORMATS):
+        return None
     return next((each for each in OTHERS if each.recognises(head)), None)
 
 
@@ -126,11 +131,6 @@ def _is_web_page(head: bytes) -> bool:
     return start.startswith((b"<!doctype html", b"<html", b"<head", b"<!--"))
 
 
-def _is_text_dataflash(head: bytes) -> bool:
-    # An older firmware puts a few lines of its own before the table of formats.
-    return re.search(rb"^FMT, ?128, ?89, ?FMT,", head, re.MULTILINE) is not None
-
-
 def _begins(*beginnings: bytes) -> Callable[[bytes], bool]:
     return lambda head: head.startswith(beginnings)
 
@@ -138,17 +138,25 @@ def _begins(*beginnings: bytes) -> Callable[[bytes], bool]:
 # ---------------------------------------------------------------- the tables
 
 FORMATS: tuple[Format, ...] = (
-    Format("tlog", "a telemetry log (.tlog)", tlog.recognises, tlog.read_chosen),
+    Format(
+        "dataflash",
+        "a dataflash log (.BIN)",
+        dataflash.recognises,
+        of_one_vehicle(dataflash.read_dataflash),
+    ),
+    Format(
+        "dataflash",
+        "a dataflash log in text (.log)",
+        dataflash.recognises_text,
+        of_one_vehicle(dataflash.read_dataflash),
+    ),
+    Format("ulog", "a PX4 log (.ulg)", ulog.recognises, of_one_vehicle(ulog.read_ulog)),
+    Format("tlog", "a telemetry log (.tlog)", tlog.recognises, tlog.read_chosen, signed=False),
 )
 """Every format that is read, in the order in which they are asked."""
 
-_NOT_YET = "give the .tlog of the same flight; this kind cannot be read yet"
-
 OTHERS: tuple[Other, ...] = (
     Other("an empty file", "copy it again from where it came", lambda head: not head),
-    Other("a dataflash log (.BIN)", _NOT_YET, _begins(b"\xa3\x95"), is_log=True),
-    Other("a dataflash log in text (.log)", _NOT_YET, _is_text_dataflash, is_log=True),
-    Other("a PX4 log (.ulg)", _NOT_YET, _begins(b"ULog\x01\x12\x35"), is_log=True),
     Other(
         "raw MAVLink without times (.rlog)",
         "give the .tlog that the ground station wrote beside it",

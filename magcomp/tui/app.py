@@ -1,90 +1,45 @@
-"""The app: holds what the pilot has in hand, runs work off the screen's thread, draws the result.
+"""The app: its keys, its palette, and what it does with each message of the screens.
 
-Screens draw ``work``, ``live``, ``busy`` and what else is frozen here. What the keys start stands
-in opening.py, fitting.py and writing.py.
+What the keys start stands in opening.py, fitting.py and writing.py; what lies below in base.py.
 """
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Any, ClassVar, TypeVar
+from collections.abc import Iterable
+from typing import Any, ClassVar
 
-from rich.text import Text
-from textual.app import App, SystemCommand
+from textual.app import SystemCommand
 from textual.binding import Binding, BindingType
 from textual.screen import Screen
 
 from magcomp.errors import MagcompError, UsageError
-from magcomp.live.snapshot import LiveSnapshot
 from magcomp.tui import fitting, opening, status, writing
-from magcomp.tui.choices import Choice
+from magcomp.tui.base import BaseApp
 from magcomp.tui.help_text import help_text, key_lines
-from magcomp.tui.next_step import explain
+from magcomp.tui.messages import (
+    CompassToggled,
+    OptionsChosen,
+    PortsWanted,
+    SnapshotTaken,
+    StateWanted,
+    TargetChosen,
+    TimeRangeWanted,
+    WatchingFailed,
+)
 from magcomp.tui.screens.connect import ConnectScreen
 from magcomp.tui.screens.dialogs import Confirm, Help, Message
 from magcomp.tui.screens.fit import FitScreen
 from magcomp.tui.screens.record import RecordScreen
 from magcomp.tui.screens.review import ReviewScreen
-from magcomp.tui.screens.step import StepScreen
 from magcomp.tui.screens.verify import VerifyScreen
-from magcomp.tui.services import Progress, Services, Session, Simulation
-from magcomp.tui.settings import (
-    Settings,
-    read_remembered,
-    settings_folder,
-    write_remembered,
-    write_template,
-)
+from magcomp.tui.settings import Settings, write_template
+from magcomp.tui.state import Busy
 from magcomp.tui.themes import DEFAULT_VARIABLES, THEMES
-from magcomp.tui.widgets.top_bar import STEPS, Status
-from magcomp.tui.work import Work, Writing
-
-TICK_S = 0.1
-"""The live screens are drawn ten times a second."""
-
-_T = TypeVar("_T")
+from magcomp.tui.widgets.top_bar import STEPS
 
 
-@dataclass(frozen=True)
-class Busy:
-    """What is being done.
-
-    Attributes
-    ----------
-    what
-        In words.
-    share
-        Done, 0 … 1.
-    """
-
-    what: str
-    share: float = 0.0
-
-    @property
-    def sentence(self) -> str:
-        """For the next line."""
-        return f"Wait: {self.what} … {100 * self.share:.0f} %"
-
-
-class MagcompApp(App[None]):
-    """Connect → record → fit → write → verify.
-
-    Parameters
-    ----------
-    target
-        An address or a log to begin with; empty for none.
-    settings
-        What stands in the settings file.
-    folder
-        Where settings and state are kept; the platform's place by default.
-    services
-        What the app calls; replaced by tests.
-    system
-        MAVLink system to work with, where several are on a link or in a log.
-    """
+class MagcompApp(BaseApp):
+    """Connect → record → fit → write → verify; parameters as of :class:`BaseApp`."""
 
     TITLE = "magcomp"
     CSS_PATH = "magcomp.tcss"
@@ -105,136 +60,55 @@ class MagcompApp(App[None]):
         Binding("ctrl+p", "command_palette", "Palette", id="app.palette", show=False),
     ]
 
-    def __init__(
-        self,
-        target: str = "",
-        *,
-        settings: Settings | None = None,
-        folder: Path | None = None,
-        services: Services | None = None,
-        system: int | None = None,
-    ) -> None:
-        super().__init__()
-        self.target = target
-        self.system = system
-        self.settings = Settings() if settings is None else settings
-        self.settings_folder = settings_folder() if folder is None else folder
-        self.services = Services() if services is None else services
-        self.remembered = read_remembered(self.settings_folder)
-        self.work = Work()
-        self.writing = Writing()
-        self.live: LiveSnapshot | None = None
-        self.session: Session | None = None
-        self.simulation: Simulation | None = None
-        self.busy: Busy | None = None
-        self.stopping = threading.Event()
-        self.choices: tuple[Choice, ...] = ()
+    def __init__(self, target: str = "", **given: Any) -> None:
+        super().__init__(target, **given)
         for theme in THEMES:
             self.register_theme(theme)
         self.theme = self._first_theme()
         self.set_keymap(_checked_keys(self.settings, self.known_actions()))
 
-    # ---------------------------------------------------------------- life
-
     def on_mount(self) -> None:
         """Begin with what the command line named."""
-        self.set_interval(TICK_S, self.tick)
-        self.theme_changed_signal.subscribe(self, lambda theme: self._remember_theme(theme.name))
+        self.theme_changed_signal.subscribe(self, lambda theme: self.remember_theme(theme.name))
         if self.target:
             self.call_after_refresh(opening.open_target, self, self.target)
 
-    def tick(self) -> None:
-        """Take a snapshot of the vehicle and draw it."""
+    # ---------------------------------------------------------------- messages
+
+    def on_state_wanted(self, message: StateWanted) -> None:  # noqa: ARG002
+        """Draw the screen that came to the front."""
+        self.redraw()
+
+    def on_ports_wanted(self, message: PortsWanted) -> None:  # noqa: ARG002
+        """Look for serial ports."""
+        opening.scan_ports(self)
+
+    def on_target_chosen(self, message: TargetChosen) -> None:
+        """Open it."""
+        opening.open_target(self, message.target)
+
+    def on_options_chosen(self, message: OptionsChosen) -> None:
+        """Fit with them."""
+        fitting.change(self, **message.changed)
+
+    def on_time_range_wanted(self, message: TimeRangeWanted) -> None:  # noqa: ARG002
+        """Ask which part to fit."""
+        fitting.ask_time_range(self)
+
+    def on_compass_toggled(self, message: CompassToggled) -> None:
+        """Write it, or leave it out."""
+        writing.choose(self, message.compass)
+
+    def on_snapshot_taken(self, message: SnapshotTaken) -> None:
+        """Draw the vehicle as it stands."""
         if self.session is not None:
-            self.live = self.session.snapshot()
+            self.live = message.snapshot
             opening.watch_vehicle(self)
             self.redraw()
 
-    def redraw(self) -> None:
-        """Draw the step on the screen, whatever lies over it."""
-        for screen in self.screen_stack:
-            if isinstance(screen, StepScreen):
-                screen.redraw()
-
-    def set_work(self, work: Work) -> None:
-        """Take new work in hand and draw it."""
-        self.work = work
-        self.redraw()
-
-    # ---------------------------------------------------------------- work off the thread
-
-    def run_task(
-        self, what: str, task: Callable[[Progress], _T], then: Callable[[_T], None]
-    ) -> None:
-        """Do something long in a thread; then draw its result, or say what went wrong."""
-        if self.busy is not None:
-            self.notify(f"Wait a moment: {self.busy.what}.")
-            return
-        self.busy = Busy(what)
-
-        def progress(name: str, share: float) -> None:
-            self.call_from_thread(self._progress, Busy(f"{what}, {name}" if name else what, share))
-
-        def run() -> None:
-            try:
-                result = task(progress)
-            except Exception as error:  # whatever it is, the pilot must hear of it in words
-                self.call_from_thread(self._failed, error)
-            else:
-                self.call_from_thread(self._done, then, result)
-
-        self.run_worker(run, thread=True, name=what, exit_on_error=False)
-        self.redraw()
-
-    def _progress(self, busy: Busy) -> None:
-        if self.busy is not None:
-            self.busy = busy
-            self.redraw()
-
-    def _done(self, then: Callable[[_T], None], result: _T) -> None:
-        self.busy = None
-        if self.stopping.is_set():
-            self._close()
-            return
-        then(result)
-        self.redraw()
-
-    def _failed(self, error: Exception) -> None:
-        self.busy = None
-        if self.stopping.is_set():
-            self._close()
-            return
-        self.redraw()
-        self.complain(error)
-
-    def complain(self, error: Exception) -> None:
-        """Say what went wrong, and what to do next."""
-        sentence, step = explain(error)
-        self.push_screen(Message("That did not work", sentence, step))
-
-    def _fatal_error(self) -> None:
-        """End with a sentence where Textual would print a traceback."""
-        error = self._exception
-        sentence, step = explain(error if error is not None else RuntimeError("unknown"))
-        self._exit_renderables.append(Text(f"magcomp: {sentence} {step}"))
-        self._close_messages_no_wait()
-
-    # ---------------------------------------------------------------- what the screens draw
-
-    @property
-    def status(self) -> Status:
-        """The second line of every screen."""
-        return status.status(self.work, self.live)
-
-    @property
-    def steps_done(self) -> frozenset[str]:
-        """Steps that need no more work."""
-        return status.steps_done(self.work, self.live)
-
-    @property
-    def binding_state(self) -> object:
-        """What `check_action` looks at."""
-        return self.current_mode, self.work.source, self.work.live, bool(self.writing.in_force)
+    def on_watching_failed(self, message: WatchingFailed) -> None:
+        """Say why the vehicle is followed no more."""
+        self.complain(message.error)
 
     # ---------------------------------------------------------------- the road
 
@@ -329,9 +203,11 @@ class MagcompApp(App[None]):
         """Stop what is being done, then give everything back, then end."""
         self.stopping.set()
         if self.busy is None:
-            self._close()
+            self.close_all()
 
-    def _close(self) -> None:
+    def close_all(self) -> None:
+        """Give everything back off the screen's thread, then end."""
+
         def close() -> None:
             opening.close(self)
             self.call_from_thread(self.exit)
@@ -393,16 +269,6 @@ class MagcompApp(App[None]):
             f"{self.settings.source}: theme must be one of {', '.join(self.available_themes)}; "
             f"instead received {wanted}"
         )
-
-    def _remember_theme(self, name: str) -> None:
-        if name != self.remembered.theme:
-            self.remembered = replace(self.remembered, theme=name)
-            write_remembered(self.settings_folder, self.remembered)
-
-    def remember_target(self, target: str) -> None:
-        """Put an address or a log at the head of those used lately."""
-        self.remembered = self.remembered.with_recent(target)
-        write_remembered(self.settings_folder, self.remembered)
 
 
 def _checked_keys(settings: Settings, known: frozenset[str]) -> dict[str, str]:

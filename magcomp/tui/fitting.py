@@ -4,23 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from magcomp.analysis import Options
 from magcomp.errors import UsageError
 from magcomp.model import Analysis, Recording
 from magcomp.tui import writing
+from magcomp.tui.base import BaseApp
 from magcomp.tui.pictures import CompassPicture
 from magcomp.tui.screens.dialogs import AskText
 from magcomp.tui.services import Progress, fit
 
-if TYPE_CHECKING:
-    from magcomp.tui.app import MagcompApp
-
 _Answer = tuple[Recording, Analysis, Mapping[int, CompassPicture]]
 
 
-def start(app: MagcompApp, options: Options) -> None:
+def start(app: BaseApp, options: Options) -> None:
     """Fit the log, or what was recorded so far; the old answer stays until there is a new one."""
     session, recording = app.session, app.work.recording
 
@@ -39,12 +37,12 @@ def start(app: MagcompApp, options: Options) -> None:
     app.run_task("fitting", task, then)
 
 
-def again(app: MagcompApp) -> None:
+def again(app: BaseApp) -> None:
     """Fit once more, with what came since."""
     start(app, app.work.options)
 
 
-def change(app: MagcompApp, **changed: Any) -> None:
+def change(app: BaseApp, **changed: Any) -> None:
     """Fit with other options."""
     try:
         options = replace(app.work.options, **changed)
@@ -54,7 +52,7 @@ def change(app: MagcompApp, **changed: Any) -> None:
     start(app, options)
 
 
-def ask_time_range(app: MagcompApp) -> None:
+def ask_time_range(app: BaseApp) -> None:
     """Ask which part of the recording to fit, and fit it."""
     options, recording = app.work.options, app.work.recording
     whole = 0.0 if recording is None else recording.duration_s

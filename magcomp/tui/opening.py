@@ -5,23 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from magcomp.errors import MagcompError
 from magcomp.link import Replay, SerialPort, parse_address
 from magcomp.model import Recording
 from magcomp.report import words
+from magcomp.tui.base import BaseApp
 from magcomp.tui.choices import choices
 from magcomp.tui.screens.dialogs import AskText, Confirm
 from magcomp.tui.services import Progress, Session, Simulation, judge_present
 from magcomp.tui.vehicle_card import VehicleCard, card_of_recording
 from magcomp.tui.work import Work, Writing
 
-if TYPE_CHECKING:
-    from magcomp.tui.app import MagcompApp
 
-
-def scan_ports(app: MagcompApp) -> None:
+def scan_ports(app: BaseApp) -> None:
     """Look for serial ports, and show everything that can be chosen."""
 
     def scan() -> None:
@@ -31,19 +28,19 @@ def scan_ports(app: MagcompApp) -> None:
     app.run_worker(scan, thread=True, exclusive=True, group="ports", exit_on_error=False)
 
 
-def _show(app: MagcompApp, ports: tuple[SerialPort, ...]) -> None:
+def _show(app: BaseApp, ports: tuple[SerialPort, ...]) -> None:
     app.choices = choices(ports, app.remembered.recent)
     app.redraw()
 
 
-def ask_log(app: MagcompApp) -> None:
+def ask_log(app: BaseApp) -> None:
     """Ask for the path of a log."""
     recent = (name for name in app.remembered.recent if name.lower().endswith(".tlog"))
     dialog = AskText("Open a log", "The path of a .tlog.", (("Log", next(recent, "")),))
     app.push_screen(dialog, lambda answer: open_target(app, answer[0]) if answer else None)
 
 
-def open_target(app: MagcompApp, target: str) -> None:
+def open_target(app: BaseApp, target: str) -> None:
     """Open a log, or connect to an address."""
     if not target:
         return
@@ -58,7 +55,7 @@ def open_target(app: MagcompApp, target: str) -> None:
         _when_free(app, lambda: _connect(app, target))
 
 
-def simulate(app: MagcompApp) -> None:
+def simulate(app: BaseApp) -> None:
     """Start a simulated vehicle and connect to it."""
 
     def started(simulation: Simulation) -> None:
@@ -73,23 +70,23 @@ def simulate(app: MagcompApp) -> None:
     )
 
 
-def leave(app: MagcompApp) -> None:
+def leave(app: BaseApp) -> None:
     """Close vehicle or log; ask where results would be lost."""
     if app.work.source:
         _when_free(app, lambda: None)
 
 
-def close(app: MagcompApp) -> None:
+def close(app: BaseApp) -> None:
     """Give everything back; may take a moment."""
-    session, simulation = app.session, app.simulation
-    app.session = app.simulation = None
+    session, simulation = app.forget_session(), app.simulation
+    app.simulation = None
     if session is not None:
         session.close()
     if simulation is not None:
         simulation.stop()
 
 
-def _when_free(app: MagcompApp, then: Callable[[], None]) -> None:
+def _when_free(app: BaseApp, then: Callable[[], None]) -> None:
     """Let go of what is open, then go on."""
 
     def free() -> None:
@@ -113,7 +110,7 @@ def _when_free(app: MagcompApp, then: Callable[[], None]) -> None:
 # ------------------------------------------------------------------------ a log
 
 
-def _open_log(app: MagcompApp, path: Path) -> None:
+def _open_log(app: BaseApp, path: Path) -> None:
     def task(progress: Progress) -> tuple[Recording, VehicleCard]:
         progress("", 0.1)
         recording = app.services.read(path, app.system)
@@ -131,23 +128,22 @@ def _open_log(app: MagcompApp, path: Path) -> None:
 # ------------------------------------------------------------------------ a vehicle
 
 
-def _connect(app: MagcompApp, address: str) -> None:
+def _connect(app: BaseApp, address: str) -> None:
     def task(_: Progress) -> Session:
         record = app.services.new_file("recording", ".tlog", None)
         record.parent.mkdir(parents=True, exist_ok=True)
         return app.services.open_live(address, record, app.system)
 
     def then(session: Session) -> None:
-        app.session = session
         if app.simulation is None:
             app.remember_target(address)
         app.set_work(Work(source=address, live=True))
-        app.tick()
+        app.follow(session)
 
     app.run_task(f"opening {address}", task, then)
 
 
-def watch_vehicle(app: MagcompApp) -> None:
+def watch_vehicle(app: BaseApp) -> None:
     """Make the vehicle's card once its calibration is read; keep its warnings fresh."""
     live, session, work = app.live, app.session, app.work
     if live is None or session is None or live.vehicle is None:
@@ -165,5 +161,5 @@ def watch_vehicle(app: MagcompApp) -> None:
         app.work = replace(work, card=replace(work.card, warnings=_warnings(app)))
 
 
-def _warnings(app: MagcompApp) -> tuple[str, ...]:
+def _warnings(app: BaseApp) -> tuple[str, ...]:
     return () if app.live is None else tuple(map(words.sentence, app.live.warnings))

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from magcomp.errors import MagcompError
 from magcomp.model import Grade
 from magcomp.report import words
+from magcomp.tui.base import BaseApp
 from magcomp.tui.changes import ChangeRow, after_event, change_rows, left_out_warnings
 from magcomp.tui.screens.dialogs import AskText, Confirm, Message
 from magcomp.tui.services import Progress
@@ -20,11 +20,8 @@ from magcomp.writing.files import SUFFIXES, format_value, write_parameter_file
 from magcomp.writing.plan import WritePlan
 from magcomp.writing.writer import raise_for_failure
 
-if TYPE_CHECKING:
-    from magcomp.tui.app import MagcompApp
 
-
-def prepare(app: MagcompApp) -> None:
+def prepare(app: BaseApp) -> None:
     """Work out what would change, for what is chosen now."""
     work = app.work
     if work.analysis is None:
@@ -38,7 +35,7 @@ def prepare(app: MagcompApp) -> None:
     app.redraw()
 
 
-def choose(app: MagcompApp, compass: int) -> None:
+def choose(app: BaseApp, compass: int) -> None:
     """Write a compass, or leave it out."""
     work = app.work
     results = {} if work.analysis is None else {c.fit.compass: c for c in work.analysis.compasses}
@@ -54,7 +51,7 @@ def choose(app: MagcompApp, compass: int) -> None:
 # ------------------------------------------------------------------------ a file
 
 
-def ask_save(app: MagcompApp) -> None:
+def ask_save(app: BaseApp) -> None:
     """Ask where to, and save the parameters of the chosen compasses."""
     if app.work.parameters is None:
         app.notify("There is nothing to save: no compass is chosen.", severity="warning")
@@ -71,7 +68,7 @@ def _proposed(work: Work) -> Path:
     return Path("compass.param") if work.live else Path(work.source).with_suffix(".param")
 
 
-def _save(app: MagcompApp, text: str) -> None:
+def _save(app: BaseApp, text: str) -> None:
     path = Path(text).expanduser()
     if path.is_file():
         question = f"{path} exists already. Overwrite it?"
@@ -81,7 +78,7 @@ def _save(app: MagcompApp, text: str) -> None:
         _save_now(app, path, force=False)
 
 
-def _save_now(app: MagcompApp, path: Path, *, force: bool) -> None:
+def _save_now(app: BaseApp, path: Path, *, force: bool) -> None:
     parameters = app.work.parameters
     if parameters is None:
         return
@@ -98,7 +95,7 @@ def _save_now(app: MagcompApp, path: Path, *, force: bool) -> None:
 # ------------------------------------------------------------------------ the vehicle
 
 
-def ask_write(app: MagcompApp) -> None:
+def ask_write(app: BaseApp) -> None:
     """Read what the vehicle holds, show what would happen, and ask."""
     session, wanted = app.session, app.work.parameters
     if session is None:
@@ -113,7 +110,7 @@ def ask_write(app: MagcompApp) -> None:
         )
 
 
-def _may_write(app: MagcompApp) -> bool:
+def _may_write(app: BaseApp) -> bool:
     live = app.live
     if live is not None and not live.connected:
         message = Message(
@@ -127,7 +124,7 @@ def _may_write(app: MagcompApp) -> bool:
     return False
 
 
-def _confirm(app: MagcompApp, plan: WritePlan) -> None:
+def _confirm(app: BaseApp, plan: WritePlan) -> None:
     rows = tuple(
         ChangeRow(change.name, format_value(change.old), format_value(change.new))
         for change in plan.changes
@@ -150,7 +147,7 @@ def _confirm(app: MagcompApp, plan: WritePlan) -> None:
     app.push_screen(dialog, lambda sure: _write(app, plan, backup) if sure else None)
 
 
-def _write(app: MagcompApp, plan: WritePlan, backup: Path) -> None:
+def _write(app: BaseApp, plan: WritePlan, backup: Path) -> None:
     session = app.session
     if session is None:
         return
@@ -173,7 +170,7 @@ def _write(app: MagcompApp, plan: WritePlan, backup: Path) -> None:
     app.run_task(WRITING, task, then)
 
 
-def _follow(app: MagcompApp, progress: Progress) -> Callable[[Event], None]:
+def _follow(app: BaseApp, progress: Progress) -> Callable[[Event], None]:
     """Make rows of what the writer tells; called on the writer's thread."""
     share = 0.0
 
@@ -191,7 +188,7 @@ def _follow(app: MagcompApp, progress: Progress) -> Callable[[Event], None]:
     return follow
 
 
-def _ended(app: MagcompApp, outcome: Outcome, backup: Path) -> bool:
+def _ended(app: BaseApp, outcome: Outcome, backup: Path) -> bool:
     """Say how a write ended; tell whether it was good."""
     try:
         raise_for_failure(outcome, backup, app.work.source)
@@ -205,7 +202,7 @@ def _ended(app: MagcompApp, outcome: Outcome, backup: Path) -> bool:
 # ------------------------------------------------------------------------ undo
 
 
-def ask_undo(app: MagcompApp) -> None:
+def ask_undo(app: BaseApp) -> None:
     """Compare the vehicle with the backup, and ask."""
     session, backup = app.session, app.writing.backup
     if session is None or backup is None or not app.writing.in_force:
@@ -218,13 +215,13 @@ def ask_undo(app: MagcompApp) -> None:
         )
 
 
-def _confirm_undo(app: MagcompApp, plan: WritePlan, backup: Path) -> None:
+def _confirm_undo(app: BaseApp, plan: WritePlan, backup: Path) -> None:
     lines = f"Bring back {len(plan.changes)} parameters from the backup?\n{backup}"
     dialog = Confirm("Undo?", lines, yes="Undo", no="Keep")
     app.push_screen(dialog, lambda sure: _undo(app, plan, backup) if sure else None)
 
 
-def _undo(app: MagcompApp, plan: WritePlan, backup: Path) -> None:
+def _undo(app: BaseApp, plan: WritePlan, backup: Path) -> None:
     session = app.session
     second = _backup(app)
     if session is None or second is None:
@@ -252,7 +249,7 @@ def _undo(app: MagcompApp, plan: WritePlan, backup: Path) -> None:
     )
 
 
-def _backup(app: MagcompApp) -> Path | None:
+def _backup(app: BaseApp) -> Path | None:
     vehicle = app.live.vehicle if app.live is not None else None
     try:
         return app.services.new_file("backup", ".param", vehicle)

@@ -72,7 +72,9 @@ def test_what_is_written_for_a_correction_is_what_comes_into_force(
 ):
     values = held()
     values |= ARDUPILOT.switch_parameters(regressor, [compass], values)
-    values |= ARDUPILOT.correction_parameters(correction, compass, values, soft_iron_fitted=True)
+    values |= ARDUPILOT.correction_parameters(
+        correction, compass, values, regressor=regressor, soft_iron_fitted=True
+    )
     in_force = ARDUPILOT.in_force(values, compass)
     assert in_force.regressor == regressor
     quantity = np.full(len(raw), u)

@@ -72,9 +72,6 @@ def test_what_holds_no_autopilot_is_refused(tmp_path: Path, content: bytes, matc
 @pytest.mark.parametrize(
     ("name", "content", "match"),
     [
-        ("a.BIN", b"\xa3\x95\x80", r"dataflash log \(\.BIN\)"),
-        ("a.ulg", b"ULog\x01\x12\x35\x01", r"PX4 log \(\.ulg\)"),
-        ("renamed.tlog", b"ULog\x01\x12\x35\x01", r"PX4 log \(\.ulg\)"),
         ("a.csv", b"x,y\n", r"table \(\.csv\)"),
     ],
 )

@@ -9,9 +9,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from dataflash_writer import short_flight as short_flight_of_dataflash
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tlog_writer import RECORDINGS, Sender, log, short_flight
+from ulog_writer import short_flight as short_flight_of_ulog
 
 from magcomp.errors import ChooseVehicleError, LogError, MagcompError
 from magcomp.model import Recording
@@ -23,11 +25,16 @@ from magcomp.sources.source import is_text
 TLOG = log(short_flight(Sender()))
 RLOG = b"".join(short_flight(Sender()))
 TEXT_LOG = b"9\r\n\r\nArduCopter V3.1\r\nFMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format\r\n"
+BIN = short_flight_of_dataflash().binary()
+ULG = short_flight_of_ulog().binary()
+LOGS = {
+    "dataflash": BIN,
+    "dataflash in text": short_flight_of_dataflash().text(),
+    "ulog": ULG,
+    "tlog": TLOG,
+}
 OTHER = {
     "an empty file": b"",
-    "a dataflash log (.BIN)": b"\xa3\x95\x80\x80\x59FMT\0" + bytes(200),
-    "a dataflash log in text (.log)": TEXT_LOG,
-    "a PX4 log (.ulg)": b"ULog\x01\x12\x35\x01" + bytes(100),
     "raw MAVLink without times (.rlog)": RLOG,
     "an archive that magcomp does not open": b"7z\xbc\xaf\x27\x1c\0\4" + bytes(100),
     "a Git-LFS pointer": b"version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 9\n",
@@ -94,7 +101,8 @@ def test_each_kind_is_recognised_by_one_entry_before_any_other(what: str) -> Non
 
 def test_every_entry_of_the_tables_has_an_example_here() -> None:
     assert [other_of(content) for content in OTHER.values()] == list(OTHERS)
-    assert [format_of(TLOG)] == list(FORMATS)
+    assert [format_of(content[:HEAD]) for content in LOGS.values()] == list(FORMATS)
+    assert format_of(TEXT_LOG) is FORMATS[1]
 
 
 @pytest.mark.parametrize("path", RECORDINGS, ids=lambda path: path.stem)
@@ -111,7 +119,7 @@ def test_a_telemetry_log_is_recognised_by_its_first_bytes(path: Path) -> None:
 def test_a_log_cut_anywhere_at_its_beginning_is_still_one(version: int, start: int) -> None:
     data = log(short_flight(Sender(version=version)))[start:]
     assert other_of(data[:HEAD]) is None
-    assert format_of(data[:HEAD]) is FORMATS[0]
+    assert format_of(data[:HEAD]) is FORMATS[-1]
 
 
 @pytest.mark.parametrize("version", [1, 2])
@@ -166,9 +174,7 @@ def test_a_vehicle_is_chosen_in_an_archive_too(tmp_path: Path) -> None:
 
 
 def test_a_zip_of_several_logs_is_refused_by_their_names(tmp_path: Path) -> None:
-    message = refusal(
-        zipped(tmp_path, **{"a.tlog": TLOG, "b.BIN": OTHER["a dataflash log (.BIN)"]})
-    )
+    message = refusal(zipped(tmp_path, **{"a.tlog": TLOG, "b.BIN": BIN}))
     assert "2 logs (a.tlog, b.BIN): unpack it and give one" in message
 
 
@@ -182,7 +188,7 @@ def test_a_zip_of_several_logs_is_refused_by_their_names(tmp_path: Path) -> None
         ({"a" * 300: b"x"}, "a" * 59 + "…)"),
         ({f"{n}.txt": b"x" for n in range(9)}, "(0.txt, 1.txt, 2.txt, 3.txt, 4.txt …)"),
         ({f"{n}": b"" for n in range(MOST_FILES + 1)}, f"holds {MOST_FILES + 1} files"),
-        ({"flight.log": TEXT_LOG}, "a dataflash log in text (.log)"),
+        ({"flight.rlog": OTHER["raw MAVLink without times (.rlog)"]}, "raw MAVLink without times"),
     ],
 )
 def test_a_zip_without_a_log_is_refused(

@@ -98,7 +98,13 @@ def result(compass: int, grade: Grade = Grade.GOOD) -> CompassResult:
         FieldResidual(31.0, 2.1, 2.3, 30.5),
         Covered(0.42, 1.0, 28.0, 2.0, 54.0, 180.0),
     )
-    return CompassResult(fit, verdict, _correction(compass, np.zeros(3)), _written(compass, grade))
+    return CompassResult(
+        fit,
+        verdict,
+        in_force=_correction(compass, np.zeros(3)),
+        parameters=_written(compass, grade),
+        left_out=_motor(compass, np.zeros(3)),
+    )
 
 
 def _correction(compass: int, motor: np.ndarray) -> Correction:
@@ -109,12 +115,17 @@ def _written(compass: int, grade: Grade) -> dict[str, float]:
     if grade is Grade.REJECTED:
         return {}
     number = "" if compass == 1 else str(compass)
-    motor = zip("XYZ", -INTERFERENCE, strict=True)
-    values = {f"COMPASS_MOT{number}_{axis}": float(value) for axis, value in motor}
+    values = _motor(compass, -INTERFERENCE)
     offsets = zip("XYZ", OFFSETS[compass], strict=True)
     values |= {f"COMPASS_OFS{number}_{axis}": float(value) for axis, value in offsets}
     values[f"COMPASS_OFS{number}_Z"] += 0.5
     return {**values, "COMPASS_MOTCT": 2.0}
+
+
+def _motor(compass: int, vector: np.ndarray) -> dict[str, float]:
+    number = "" if compass == 1 else str(compass)
+    axes = zip("XYZ", vector, strict=True)
+    return {f"COMPASS_MOT{number}_{axis}": float(value) for axis, value in axes}
 
 
 def _fit(compass: int) -> MotorFit:

@@ -171,11 +171,31 @@ async def until(pilot: Any, true: Callable[[], object], *, idle: bool = True) ->
 
 
 async def steady(pilot: Any) -> None:
-    """Let the app work until the screen stays as it is."""
+    """Let the app work until nothing waits to be laid out or drawn, and the screen stays.
+
+    However busy the machine is: what counts is that no message is on its way, not that the
+    process has been quiet for a moment.
+    """
     seen: list[str] = []
-    while len(seen) < 4 or len(set(seen[-4:])) > 1:
+    while len(seen) < 3 or len(set(seen[-3:])) > 1:
         await pilot.pause()
-        seen.append(picture(pilot.app))
+        if _waits(pilot.app):
+            seen.clear()
+        else:
+            seen.append(picture(pilot.app))
+
+
+def _waits(app: MagcompApp) -> bool:
+    """Whether a message, a layout or a part of the screen is still to be dealt with."""
+    on_screen = app.screen
+    nodes = (app, *on_screen.walk_children(with_self=True))
+    return bool(
+        on_screen._layout_required
+        or on_screen._layout_widgets
+        or on_screen._dirty_widgets
+        or app.workers._workers
+        or any(node._message_queue is None or node._message_queue.qsize() for node in nodes)
+    )
 
 
 async def press(pilot: Any, *keys: str) -> None:

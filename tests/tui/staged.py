@@ -33,12 +33,12 @@ def app(folder: Path) -> MagcompApp:
 async def _live(pilot: Any, step: str, work: Work, **changes: object) -> None:
     app = pilot.app
     await until(pilot, lambda: app.choices)
-    app.session = ScriptedSession(made.snapshot(**changes))
     app.set_work(work)
+    app.follow(ScriptedSession(made.snapshot(**changes)))
+    await until(pilot, lambda: app.live)
     writing.prepare(app)
     app.writing = replace(app.writing, backup=BACKUP)
     app.action_go(step)
-    app.tick()
     await until(pilot, lambda: app.current_mode == step and app.screen.is_current)
 
 
@@ -121,7 +121,7 @@ async def verify_moved(pilot: Any) -> None:
     await verify(pilot)
     app = pilot.app
     app.session.change(current=0.0, throttle=0.0)
-    app.tick()
+    await until(pilot, lambda: app.live is app.session.shown)
     await pilot.press("m")
     compasses = []
     for compass in app.session.shown.compasses:
@@ -129,8 +129,7 @@ async def verify_moved(pilot: Any) -> None:
         moved = (x + 24.0 * 1.5, y - 24.0 * 2.25, z + 12.0)
         compasses.append(replace(compass, field=moved, heading_deg=compass.heading_deg + 12.0))
     app.session.change(current=24.0, throttle=0.42, elapsed_s=95.0, compasses=tuple(compasses))
-    app.tick()
-    await pilot.pause()
+    await until(pilot, lambda: app.live is app.session.shown)
 
 
 async def trouble(pilot: Any) -> None:

@@ -121,7 +121,9 @@ async def test_the_difference_can_be_saved_and_is_what_was_shown(tmp_path):
         await press(pilot, "enter")
         await until(pilot, lambda: pilot.app.work.kept)
         saved = read_parameter_file(path)
-        assert {n for n in saved.values if "MOT3" in n} == set()
+        # The switch serves compass 3 as well: left out, it gets a vector of zeros and nothing else.
+        assert {n for n in saved.values if "3_" in n} == {f"COMPASS_MOT3_{a}" for a in "XYZ"}
+        assert not any(saved.values[f"COMPASS_MOT3_{axis}"] for axis in "XYZ")
         for row in pilot.app.writing.rows:
             assert np.float32(row.new) == np.float32(saved.values[row.name])
         assert "Saved to" in screen(pilot.app)

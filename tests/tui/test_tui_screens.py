@@ -37,3 +37,23 @@ def test_screen(stage, size, tmp_path, snapshot, snap_compare):
     assert len(shown[0].splitlines()) <= size[1]
     assert max(map(len, shown[0].splitlines())) <= size[0]
     assert same or textual_version != MADE_WITH
+
+
+@pytest.mark.parametrize(
+    "stage",
+    [staged.connect, staged.record, staged.fit_heading, staged.verify_moved],
+    ids=lambda stage: stage.__name__,
+)
+async def test_a_picture_depends_only_on_data_and_size(stage, tmp_path):
+    """However the room came about: a terminal that grew looks like one that was large."""
+    small, large = staged.SIZES
+
+    async def grown(first) -> str:
+        app = staged.app(tmp_path)
+        async with app.run_test(size=first) as pilot:
+            await stage(pilot)
+            await pilot.resize_terminal(*large)
+            await scripted.steady(pilot)
+            return scripted.picture(app)
+
+    assert await grown(small) == await grown(large)

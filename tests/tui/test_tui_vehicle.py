@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import threading
 from dataclasses import replace
 
 import made
@@ -10,7 +11,7 @@ import pytest
 import scripted
 from scripted import ScriptedSession, press, screen, until
 
-from magcomp.errors import LinkTimeoutError, VehicleRefusedError, WriteError
+from magcomp.errors import LinkError, LinkTimeoutError, VehicleRefusedError, WriteError
 from magcomp.live.guide import Guidance, Situation
 from magcomp.model import Grade, ParameterChange, ParameterHistory
 from magcomp.tui import opening, writing
@@ -137,6 +138,40 @@ async def test_a_lost_link_is_shown_in_words_and_recovered_from_on_the_same_scre
         session.change(connected=True)
         await until(pilot, lambda: "link good" in screen(pilot.app))
         assert pilot.app.current_mode == "record"
+
+
+async def test_a_snapshot_that_waits_for_the_link_does_not_hold_up_the_keys(tmp_path):
+    waits, release = threading.Event(), threading.Event()
+
+    class Slow(ScriptedSession):
+        def snapshot(self):
+            waits.set()
+            release.wait(scripted.PATIENCE_S)
+            return self.shown
+
+    app = scripted.app(tmp_path)
+    async with app.run_test() as pilot:
+        app.follow(Slow())
+        await until(pilot, waits.is_set)
+        await press(pilot, "l")
+        assert app.theme == "sun"
+        assert app.live is None
+        release.set()
+        await until(pilot, lambda: app.live is not None)
+
+
+async def test_a_snapshot_that_fails_is_told_once_and_the_app_goes_on(tmp_path):
+    class Broken(ScriptedSession):
+        def snapshot(self):
+            raise LinkError("udp:1:2 is gone")
+
+    app = scripted.app(tmp_path)
+    async with app.run_test() as pilot:
+        app.follow(Broken())
+        await until(pilot, lambda: isinstance(app.screen, Message))
+        assert "Udp:1:2 is gone." in screen(app)
+        await press(pilot, "enter")
+        assert app.is_running
 
 
 async def test_when_it_is_enough_the_next_step_is_named(tmp_path):

@@ -13,8 +13,8 @@ from textual.widgets import Input, OptionList, Static
 from textual.widgets.option_list import Option
 
 from magcomp.report import words
-from magcomp.tui import opening
 from magcomp.tui.choices import SIMULATED, Choice
+from magcomp.tui.messages import PortsWanted, TargetChosen
 from magcomp.tui.screens.step import StepScreen
 from magcomp.tui.vehicle_card import VehicleCard
 
@@ -128,7 +128,7 @@ class ConnectScreen(StepScreen):
         self.query_one("#choices").border_title = "Where is the vehicle?"
         self.query_one("#card").border_title = "Vehicle"
         self.query_one(TargetList).focus()
-        opening.scan_ports(self.magcomp)
+        self.post_message(PortsWanted())
 
     def _fill(self, choices: tuple[Choice, ...]) -> None:
         if choices == self._choices:
@@ -145,8 +145,8 @@ class ConnectScreen(StepScreen):
 
     def draw(self) -> None:
         """Draw the vehicle and what to do next."""
-        work, busy, live = self.magcomp.work, self.magcomp.busy, self.magcomp.live
-        self._fill(self.magcomp.choices)
+        work, busy, live = self.state.work, self.state.busy, self.state.live
+        self._fill(self.state.choices)
         self.query_one(CardView).show(work.card)
         if self.has_class("-known") != (work.card is not None):
             self.set_class(work.card is not None, "-known")
@@ -165,25 +165,24 @@ class ConnectScreen(StepScreen):
     def on_resize(self) -> None:
         """Fill the list anew: how many lines a choice has depends on the room."""
         self._choices = ()
-        self.redraw()
 
-    def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
+    async def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
         """Connect to a line of the list."""
         target = event.option_id or ""
         if target == SIMULATED:
-            opening.simulate(self.magcomp)
+            await self.run_action("app.simulate")
         elif target:
-            opening.open_target(self.magcomp, target)
+            self.post_message(TargetChosen(target))
 
     def on_input_submitted(self, event: Input.Submitted) -> None:
         """Connect to what was typed."""
         if event.value.strip():
             self.action_choose()
-            opening.open_target(self.magcomp, event.value.strip())
+            self.post_message(TargetChosen(event.value.strip()))
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:  # noqa: ARG002
         """Hide what is done with."""
-        return action not in ("address", "ports") or not self.magcomp.work.source
+        return action not in ("address", "ports") or not self.state.work.source
 
     def action_address(self) -> None:
         """Type an address."""
@@ -195,4 +194,4 @@ class ConnectScreen(StepScreen):
 
     def action_ports(self) -> None:
         """Look for serial ports again."""
-        opening.scan_ports(self.magcomp)
+        self.post_message(PortsWanted())

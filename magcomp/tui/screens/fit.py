@@ -16,7 +16,7 @@ from magcomp.analysis import Options
 from magcomp.fit import METHODS
 from magcomp.model import CURRENT, Analysis, Grade
 from magcomp.report import words
-from magcomp.tui import fitting
+from magcomp.tui.messages import OptionsChosen, TimeRangeWanted
 from magcomp.tui.pictures import AXES, CompassPicture
 from magcomp.tui.screens.step import StepScreen
 from magcomp.tui.widgets.heading_table import HeadingTable
@@ -91,7 +91,7 @@ and C change method, regressor, time range and compasses, and fit again at once.
 
     def draw(self) -> None:
         """Draw the answer, the options, and how far a new fit is."""
-        work, busy = self.magcomp.work, self.magcomp.busy
+        work, busy = self.state.work, self.state.busy
         bar = self.query_one(ProgressBar)
         bar.display = busy is not None
         if busy is not None:
@@ -110,13 +110,15 @@ and C change method, regressor, time range and compasses, and fit again at once.
         self.say(busy.sentence if busy is not None else self._next(analysis))
 
     def _draw_compass(self, analysis: Analysis) -> None:
-        pictures = self.magcomp.work.pictures
+        pictures = self.state.work.pictures
         if self._compass not in pictures:
             self._compass = min(pictures)
         shown = pictures[self._compass]
         self.query_one("#grades", Static).update(grades_line(analysis, self._compass))
         if self._drawn == (shown, analysis):
             return
+        if self._drawn is None:
+            self.call_after_refresh(self._focus_view)
         self._drawn = (shown, analysis)
         self.query_one(HeadingTable).show(shown.errors)
         self.query_one(ShiftPlot).show(shown.shift)
@@ -149,15 +151,21 @@ and C change method, regressor, time range and compasses, and fit again at once.
     def _show_view(self) -> None:
         for name in VIEWS:
             self.query_one(f"#view-{name}").set_class(name == self._view, "-shown")
+        self.call_after_refresh(self._focus_view)
+
+    def _focus_view(self) -> None:
+        """Let the arrow keys scroll what is shown."""
+        scrolled = self.query(f"#view-{self._view}, #view-{self._view} VerticalScroll")
+        self.set_focus(next((each for each in scrolled if each.can_focus), None))
 
     # ---------------------------------------------------------------- keys
 
     def action_compass(self, compass: int) -> None:
         """Show one compass."""
-        if compass in self.magcomp.work.pictures:
+        if compass in self.state.work.pictures:
             self._compass = compass
             self.redraw()
-        elif self.magcomp.work.analysis is not None:
+        elif self.state.work.analysis is not None:
             self.notify(f"Compass {compass} is not in this fit. C chooses what is fitted.")
 
     def action_view(self) -> None:
@@ -168,23 +176,24 @@ and C change method, regressor, time range and compasses, and fit again at once.
 
     def action_method(self) -> None:
         """Fit with the next method."""
-        fitting.change(self.magcomp, method=_after(METHODS, self.magcomp.work.options.method))
+        self._change(method=_after(METHODS, self.state.work.options.method))
 
     def action_regressor(self) -> None:
         """Fit against the next control quantity."""
-        fitting.change(
-            self.magcomp, regressor=_after(REGRESSORS, self.magcomp.work.options.regressor)
-        )
+        self._change(regressor=_after(REGRESSORS, self.state.work.options.regressor))
 
     def action_compasses(self) -> None:
         """Fit all compasses, or one."""
-        recording = self.magcomp.work.recording
+        recording = self.state.work.recording
         every = (None, *sorted(recording.field)) if recording is not None else (None,)
-        fitting.change(self.magcomp, compass=_after(every, self.magcomp.work.options.compass))
+        self._change(compass=_after(every, self.state.work.options.compass))
 
     def action_time(self) -> None:
         """Ask for another time range."""
-        fitting.ask_time_range(self.magcomp)
+        self.post_message(TimeRangeWanted())
+
+    def _change(self, **changed: object) -> None:
+        self.post_message(OptionsChosen(changed))
 
 
 def options_line(options: Options, analysis: Analysis | None, keys: Sequence[str]) -> Content:

@@ -68,7 +68,7 @@ is enough, press N. You can fit at any time and come back: the recording goes on
 
     def draw(self) -> None:
         """Draw the newest snapshot."""
-        live, busy = self.magcomp.live, self.magcomp.busy
+        live, busy = self.state.live, self.state.busy
         if live is None:
             self.say("Connect to a vehicle first: press B.")
             return

@@ -14,8 +14,8 @@ from textual.widgets import DataTable, ProgressBar, Static
 
 from magcomp.model import Analysis, Grade
 from magcomp.report import words
-from magcomp.tui import writing as writer
 from magcomp.tui.changes import ChangeRow
+from magcomp.tui.messages import CompassToggled
 from magcomp.tui.screens.step import StepScreen
 from magcomp.tui.widgets.verdict_text import grade_word
 
@@ -74,7 +74,7 @@ class ReviewScreen(StepScreen):
 
     def draw(self) -> None:
         """Draw the difference as it stands, or as it is being written."""
-        work, busy = self.magcomp.work, self.magcomp.busy
+        work, busy = self.state.work, self.state.busy
         bar = self.query_one(ProgressBar)
         bar.display = busy is not None
         if busy is not None:
@@ -82,7 +82,7 @@ class ReviewScreen(StepScreen):
         if work.analysis is not None:
             self.query_one("#grades", Static).update(chosen_line(work.analysis, work.chosen))
             self._show_benefit(work.analysis)
-        writing = self.magcomp.writing
+        writing = self.state.writing
         self._fill(writing.rows)
         table = self.query_one(ChangeTable)
         table.border_subtitle = f"{len(writing.rows)} parameters"
@@ -114,7 +114,7 @@ class ReviewScreen(StepScreen):
                 table.move_cursor(row=index)
 
     def _place(self) -> Content:
-        writing = self.magcomp.writing
+        writing = self.state.writing
         lines = [Content.assemble((" Mind: ", "bold $warning"), text) for text in writing.warnings]
         if writing.backup is not None:
             lines.append(Content.assemble((" Backup: ", "$quiet"), str(writing.backup)))
@@ -123,12 +123,12 @@ class ReviewScreen(StepScreen):
         return Content("\n").join(lines)
 
     def _next(self) -> str:
-        work = self.magcomp.work
+        work = self.state.work
         if work.analysis is None:
             return "There is no fit yet: press B and fit a recording."
         if work.analysis.grade is Grade.REJECTED:
             return "Every compass is rejected, so there is nothing to write. Press B."
-        if not self.magcomp.writing.rows:
+        if not self.state.writing.rows:
             return "Nothing would change. Press 1, 2 or 3 to choose compasses, or B to go back."
         if not work.live:
             return "Press S to save these parameters to a file for your ground station."
@@ -138,7 +138,7 @@ class ReviewScreen(StepScreen):
 
     def action_choose(self, compass: int) -> None:
         """Write one compass or leave it."""
-        writer.choose(self.magcomp, compass)
+        self.post_message(CompassToggled(compass))
 
 
 def chosen_line(analysis: Analysis, chosen: frozenset[int]) -> Content:

@@ -62,25 +62,25 @@ class VerifyScreen(StepScreen):
 
     def draw(self) -> None:
         """Draw the newest headings."""
-        app = self.magcomp
-        if app.live is None:
+        state = self.state
+        if state.live is None:
             self.say("Connect to a vehicle first.")
             return
-        now = app.live.elapsed_s
-        self._pairs = self._watch.look(heading_pairs(app.live, app.work, app.writing), now)
-        self.query_one(ControlBars).show(app.live)
+        now = state.live.elapsed_s
+        self._pairs = self._watch.look(heading_pairs(state.live, state.work, state.writing), now)
+        self.query_one(ControlBars).show(state.live)
         self.query_one(HeadingPairs).show(self._pairs, marked=self._watch.marked)
         if abs(now - self._plotted_at) >= _PLOT_EVERY_S and self.has_class("-tall"):
             self._plotted_at = now
             self.query_one(HeadingPlot).show(self._watch.trace(self._compass))
         self._show_state()
-        self.say(app.busy.sentence if app.busy is not None else self._next())
+        self.say(state.busy.sentence if state.busy is not None else self._next())
 
     def _show_state(self) -> None:
-        app = self.magcomp
-        if app.writing.in_force:
+        state = self.state
+        if state.writing.in_force:
             said = "The new parameters are in force; “before” is worked out from the backup."
-        elif app.work.analysis is not None:
+        elif state.work.analysis is not None:
             said = "Nothing is written yet; “corrected” is worked out from the fit."
         else:
             said = "Nothing is fitted yet, so there is nothing to compare."
@@ -89,7 +89,7 @@ class VerifyScreen(StepScreen):
             self.query_one("#held-now", Static).update(Content(f" {said}"))
 
     def _next(self) -> str:
-        live = self.magcomp.live
+        live = self.state.live
         if live is not None and not live.connected:
             return "The link is lost: stay here, it goes on when the link is back."
         if live is not None and live.armed and live.situation is Situation.FLYING:

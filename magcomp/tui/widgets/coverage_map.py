@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from textual.content import Content
-from textual.widgets import Static
 
 from magcomp.buffer import BANDS, LEVELS, SECTORS, Coverage
 from magcomp.live.guide import LEVEL_ENOUGH
 from magcomp.tui.widgets.bars import bar
+from magcomp.tui.widgets.drawn import Drawn
 
 _MANY = 20
 _NAMES = 6
@@ -16,7 +18,23 @@ _SIGNS = (("·", "$quiet"), ("▒", "$warning"), ("█", "$success"))
 _BAND_NAMES = ("up", "", "", "", "", "down")
 
 
-class CoverageMap(Static):
+@dataclass(frozen=True)
+class Seen:
+    """Attitudes seen.
+
+    Attributes
+    ----------
+    grades
+        0 not seen, 1 a little, 2 enough, for each band and in it each sector.
+    share
+        Of the sphere that was seen, 0 … 1.
+    """
+
+    grades: tuple[tuple[int, ...], ...]
+    share: float
+
+
+class CoverageMap(Drawn[Seen]):
     """Where the earth's field has pointed, as the vehicle sees it."""
 
     HELP = """\
@@ -25,33 +43,53 @@ all around it. Each cell is one direction as seen from the vehicle: `··` not s
 little, `██` enough. A level turn fills one row; tilting fills the others.
 """
 
-    def __init__(self, *, id: str | None = None) -> None:  # noqa: A002 - Textual's own name
-        super().__init__(id=id)
-        self._shown: object = None
-
     def show(self, coverage: Coverage) -> None:
-        """Draw all levels together; nothing happens where no cell changed."""
+        """Draw all levels together."""
         seen = coverage.counts.sum(axis=0)
-        grade = ((seen > 0).astype(np.int8) + (seen >= _MANY)).reshape(BANDS, SECTORS)
-        wide = min(max((self.size.width - _NAMES) // SECTORS, 2), 4)
-        high = min(max((self.size.height - 1) // BANDS, 1), 2)
-        key = (grade.tobytes(), wide, high)
-        if key == self._shown:
-            return
-        self._shown = key
+        grades = ((seen > 0).astype(np.int8) + (seen >= _MANY)).reshape(BANDS, SECTORS)
+        self.draw_data(Seen(tuple(map(tuple, grades.tolist())), float((seen > 0).mean())))
+
+    def picture(self, data: Seen, width: int, height: int) -> Content:
+        """A map whose cells grow with the room."""
+        wide = min(max((width - _NAMES) // SECTORS, 2), 4)
+        high = min(max((height - 1) // BANDS, 1), 2)
         signs = [(sign * wide, style) for sign, style in _SIGNS]
         lines = []
-        for name, row in zip(_BAND_NAMES, grade, strict=True):
-            cells = [signs[value] for value in row.tolist()]
+        for name, row in zip(_BAND_NAMES, data.grades, strict=True):
+            cells = [signs[value] for value in row]
             lines.append(Content.assemble((f"{name:>5} ", "$quiet"), *cells))
             lines += [Content.assemble(" " * _NAMES, *cells)] * (high - 1)
         sides = "".join(f"{side:<{3 * wide}}" for side in ("front", "right", "back", "left"))
-        foot = f"{'':{_NAMES}}{sides}{100 * float((seen > 0).mean()):3.0f} %"
-        content = Content("\n").join([*lines, Content.styled(foot, "$quiet")])
-        self.update(content, layout=False)
+        foot = f"{'':{_NAMES}}{sides}{100 * data.share:3.0f} %"
+        return Content("\n").join([*lines, Content.styled(foot, "$quiet")])
 
 
-class LevelTable(Static):
+@dataclass(frozen=True)
+class LevelRow:
+    """One tenth of the throttle.
+
+    Attributes
+    ----------
+    level
+        0 … 9.
+    held_s
+        Seconds at this throttle, to a tenth.
+    sixteenths
+        Of the sphere that was seen here.
+    done
+        Enough turns for an ellipsoid of its own.
+    now
+        The throttle is here.
+    """
+
+    level: int
+    held_s: float
+    sixteenths: int
+    done: bool
+    now: bool
+
+
+class LevelTable(Drawn[tuple[LevelRow, ...]]):
     """Which control levels are done: seconds and attitudes at each tenth of throttle."""
 
     HELP = """\
@@ -60,35 +98,38 @@ throttle: how long it was held, and the share of attitudes seen there. *done* me
 this throttle for an ellipsoid of its own; a flight does not need that.
 """
 
-    def __init__(self, *, id: str | None = None) -> None:  # noqa: A002 - Textual's own name
-        super().__init__(id=id)
-        self._shown: object = None
-
     def show(
         self, coverage: Coverage, seconds: tuple[float, ...], done: tuple[int, ...], now: int | None
     ) -> None:
-        """Draw the levels that were held; nothing happens where nothing changed."""
+        """Draw the levels, those that were held where there is no room for all."""
         fractions = coverage.fraction
-        rows = tuple(
-            (level, round(seconds[level]), round(16 * float(fractions[level])), level in done)
+        rows = (
+            LevelRow(
+                level,
+                round(seconds[level], 1),
+                round(16 * float(fractions[level])),
+                level in done,
+                level == now,
+            )
             for level in range(LEVELS)
-            if seconds[level] >= 0.5 or level == now or self.size.height > LEVELS
         )
-        width = min(max(self.size.width - 28, 8), 24)
-        if (rows, now, width) == self._shown:
-            return
-        self._shown = (rows, now, width)
+        self.draw_data(tuple(rows))
+
+    def picture(self, data: tuple[LevelRow, ...], width: int, height: int) -> Content:
+        """A line a level."""
+        rows = [row for row in data if row.held_s >= 0.5 or row.now or height > LEVELS]
+        length = min(max(width - 28, 8), 24)
         lines = [Content.styled(" throttle      held  turned", "$quiet")]
-        for level, held, sixteenths, is_done in rows:
-            pointer = "▸" if level == now else " "
-            word = "done" if is_done else ""
+        for row in rows:
+            pointer = "▸" if row.now else " "
+            span = f"{10 * row.level:3d}–{10 * row.level + 10:3d} %"
             lines.append(
                 Content.assemble(
-                    f"{pointer}{10 * level:3d}–{10 * level + 10:3d} % {held:4d} s ",
-                    bar(sixteenths / 16 / LEVEL_ENOUGH, width, style="$success"),
-                    f" {word}",
+                    f"{pointer}{span} {row.held_s:4.0f} s ",
+                    bar(row.sixteenths / 16 / LEVEL_ENOUGH, length, style="$success"),
+                    " done" if row.done else " ",
                 )
             )
         if not rows:
             lines.append(Content.styled(" none yet", "$quiet"))
-        self.update(Content("\n").join(lines), layout=False)
+        return Content("\n").join(lines)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 from textual.content import Content
-from textual.widgets import Static
 
 from magcomp.tui.before_after import TRACE_S, HeadingPair, HeadingTrace
 from magcomp.tui.widgets.bars import tail
+from magcomp.tui.widgets.drawn import Drawn
 from magcomp.tui.widgets.live_table import direction
 from magcomp.tui.widgets.plots import Picture
 
@@ -16,7 +16,7 @@ _FULL_DEG = 30.0
 _TITLE = 12
 
 
-class HeadingPairs(Static):
+class HeadingPairs(Drawn[tuple[bool, tuple[HeadingPair, ...]]]):
     """A block a compass: before on the left, corrected on the right."""
 
     HELP = """\
@@ -28,21 +28,21 @@ Hold the vehicle still and tied down, press M to mark its heading, then change t
 out* grow with the throttle.
 """
 
-    def __init__(self, *, id: str | None = None) -> None:  # noqa: A002 - Textual's own name
-        super().__init__(id=id)
-        self._text = ""
-
     def show(self, pairs: tuple[HeadingPair, ...], *, marked: bool) -> None:
-        """Draw; nothing happens where no digit changed."""
-        content = self._content(pairs, marked=marked)
-        if content.plain != self._text:
-            self._text = content.plain
-            self.update(content, layout=False)
+        """Draw; with how far each has moved where there is a mark."""
+        self.draw_data((marked, pairs))
 
-    def _content(self, pairs: tuple[HeadingPair, ...], *, marked: bool) -> Content:
+    def picture(
+        self,
+        data: tuple[bool, tuple[HeadingPair, ...]],
+        width: int,
+        height: int,  # noqa: ARG002
+    ) -> Content:
+        """A block a compass."""
+        marked, pairs = data
         if not pairs:
             return Content(" no compass reports yet")
-        column = max((self.size.width - _TITLE - 14) // 2, 20)
+        column = max((width - _TITLE - 14) // 2, 20)
         head = f"{'':{_TITLE}}{'before':<{column}}{'corrected':<{column}}takes out"
         lines = [Content.styled(head, "$quiet")]
         for pair in pairs:

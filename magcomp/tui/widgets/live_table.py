@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from textual.content import Content
-from textual.widgets import Static
 
 from magcomp.live.snapshot import CompassNow, LiveSnapshot
 from magcomp.tui.widgets.bars import bar
+from magcomp.tui.widgets.drawn import Drawn
 from magcomp.tui.widgets.verdict_text import grade_word
 
 _POINTS = ("N", "NE", "E", "SE", "S", "SW", "W", "NW")
@@ -14,7 +16,7 @@ _FULL_MGAUSS = 900.0
 _SCALES_A = (20.0, 50.0, 100.0, 200.0, 500.0)
 
 
-class LiveTable(Static):
+class LiveTable(Drawn[tuple[CompassNow, ...]]):
     """Field strength and heading of each compass."""
 
     HELP = """\
@@ -24,23 +26,17 @@ force; *corrected*: with the newest fit. *Fit so far*: what the judge says of th
 is.
 """
 
-    def __init__(self, *, id: str | None = None) -> None:  # noqa: A002 - Textual's own name
-        super().__init__(id=id)
-        self._text = ""
-
     def show(self, live: LiveSnapshot) -> None:
-        """Draw; nothing happens where no digit changed."""
-        table = self._table(live)
-        if table.plain != self._text:
-            self._text = table.plain
-            self.update(table, layout=False)
+        """Draw every compass that reports."""
+        self.draw_data(live.compasses)
 
-    def _table(self, live: LiveSnapshot) -> Content:
-        width = max(min(self.size.width - 64, 30), 6)
-        head = f"  compass  strength {'':{width}}   heading   corrected  fit so far"
+    def picture(self, data: tuple[CompassNow, ...], width: int, height: int) -> Content:  # noqa: ARG002
+        """A line a compass."""
+        length = max(min(width - 64, 30), 6)
+        head = f"  compass  strength {'':{length}}   heading   corrected  fit so far"
         lines = [Content.styled(head, "$quiet")]
-        lines += [self._row(compass, width) for compass in live.compasses]
-        if not live.compasses:
+        lines += [self._row(compass, length) for compass in data]
+        if not data:
             lines.append(Content("  no compass reports yet"))
         return Content("\n").join(lines)
 
@@ -55,7 +51,24 @@ is.
         )
 
 
-class ControlBars(Static):
+@dataclass(frozen=True)
+class Control:
+    """Throttle and current.
+
+    Attributes
+    ----------
+    throttle, current
+        0 … 1 and amperes; None where not known.
+    full
+        Amperes of a full bar.
+    """
+
+    throttle: float | None
+    current: float | None
+    full: float
+
+
+class ControlBars(Drawn[Control]):
     """Throttle and current."""
 
     HELP = """\
@@ -65,33 +78,28 @@ moves with one of them.
 
     def __init__(self, *, id: str | None = None) -> None:  # noqa: A002 - Textual's own name
         super().__init__(id=id)
-        self._text = ""
         self._most = _SCALES_A[0]
 
     def show(self, live: LiveSnapshot) -> None:
         """Draw; the full length of the current's bar grows with the largest current so far."""
-        current = live.current or 0.0
-        fits = (scale for scale in _SCALES_A if scale >= max(current, self._most))
+        fits = (scale for scale in _SCALES_A if scale >= max(live.current or 0.0, self._most))
         self._most = next(fits, _SCALES_A[-1])
-        width = max(self.size.width - 31, 8)
-        throttle = live.throttle or 0.0
+        self.draw_data(Control(live.throttle, live.current, self._most))
+
+    def picture(self, data: Control, width: int, height: int) -> Content:  # noqa: ARG002
+        """Two bars."""
+        length = max(width - 31, 8)
+        throttle, current = data.throttle or 0.0, data.current or 0.0
+        share = current / data.full
         lines = [
             _control(
-                "throttle", live.throttle, f"{100 * throttle:3.0f} %", throttle, "100 %", width
+                "throttle", data.throttle, f"{100 * throttle:3.0f} %", throttle, "100 %", length
             ),
             _control(
-                "current",
-                live.current,
-                f"{current:5.1f} A",
-                current / self._most,
-                f"{self._most:.0f} A",
-                width,
+                "current", data.current, f"{current:5.1f} A", share, f"{data.full:.0f} A", length
             ),
         ]
-        content = Content("\n").join(lines)
-        if content.plain != self._text:
-            self._text = content.plain
-            self.update(content, layout=False)
+        return Content("\n").join(lines)
 
 
 def _control(

@@ -1,0 +1,293 @@
+"""The quantities of a Recording from the topics of a PX4 log, in the model's units."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from magcomp.autopilots.px4_correction import MGAUSS, Compensation, stored
+from magcomp.autopilots.px4_rotation import sensor_to_body
+from magcomp.autopilots.px4_settings import NUMBERS, compasses, slot_of
+from magcomp.model import BoolArray, FloatArray, Series
+from magcomp.sources.ulog_file import MICROSECOND, Topic, UlogFile
+
+_NO_SENSOR = -1.0
+_ARMED = 2
+_FIX_3D = 3
+_OUTPUTS = 16
+_MOTORS = 12
+_THRUST_TOPIC_ALONE = (1, 14)
+"""From here on P is the length of the thrust setpoint; before it was control 3."""
+
+_EARLIEST_UTC_US = 1.0e15
+
+
+class Field(NamedTuple):
+    """The readings of one compass in body axes, mGauss, and whether they are the sensor's own."""
+
+    field: Series
+    raw: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Quantities:
+    """A log's topics, and what is needed to understand them.
+
+    Attributes
+    ----------
+    log
+        The topics.
+    zero
+        Microseconds of time zero.
+    version
+        The firmware's, such as ``"1.15.2"``; empty where unknown.
+    values
+        Every parameter at the end.
+    """
+
+    log: UlogFile
+    zero: int
+    version: str
+    values: Mapping[str, float]
+
+    def rows(self) -> int:
+        """Messages of all topics that are read."""
+        return sum(map(len, self.log.topics.values()))
+
+    def compasses(self) -> dict[int, Field]:
+        """Each compass by its number: the sensors' own fields, else the corrected ones."""
+        names = ("device_id", "x", "y", "z")
+        raw = self.log.instances("sensor_mag", *names)
+        if raw:
+            tables = [
+                (topic, np.stack([topic.number(axis) for axis in "xyz"], axis=1))
+                for topic in raw.values()
+            ]
+            return self._by_device(tables, raw=True)
+        parts = [f"magnetometer_ga[{axis}]" for axis in range(3)]
+        corrected = self.log.instances("vehicle_magnetometer", *parts)
+        if not corrected and (topic := self.log.topic("sensor_combined", *parts)) is not None:
+            corrected = {0: topic}
+        tables = [(topic, topic.vector("magnetometer_ga", 3)) for topic in corrected.values()]
+        return self._by_device(tables, raw=False)
+
+    def _by_device(self, tables: list[tuple[Topic, FloatArray]], *, raw: bool) -> dict[int, Field]:
+        """Rows of all instances by the slot of their device: which one reports may change."""
+        rows: dict[int, list[tuple[FloatArray, FloatArray]]] = {}
+        for topic, value in tables:
+            time = self._time(topic)
+            sound = np.isfinite(value).all(axis=1) & (value != 0.0).any(axis=1)
+            devices = topic.columns.get("device_id", np.zeros(len(time)))
+            for device in np.unique(devices[sound]).tolist():
+                mine = sound & (devices == device)
+                rows.setdefault(int(device), []).append((time[mine], value[mine]))
+        numbers = self._numbers(rows)
+        found = {}
+        for device, parts in rows.items():
+            if device in numbers:
+                turn = sensor_to_body(self.values, numbers[device]) if raw else np.eye(3)
+                time = np.concatenate([part[0] for part in parts])
+                value = MGAUSS * np.concatenate([part[1] for part in parts]) @ turn.T
+                order = np.argsort(time, kind="stable")
+                found[numbers[device]] = Field(Series(time[order], value[order]), raw)
+        return dict(sorted(found.items()))
+
+    def _numbers(self, devices: Mapping[int, object]) -> dict[int, int]:
+        """The compass of each device; those without a slot get the numbers that are left."""
+        found = {
+            device: number
+            for device in devices
+            if (number := slot_of(self.values, device)) is not None
+        }
+        without = (device for device in devices if device not in found)
+        taken = {compass.slot for compass in compasses(self.values)}
+        left = (number for number in NUMBERS if number not in taken)
+        return found | dict(zip(without, left, strict=False))
+
+    def attitude(self) -> Series | None:
+        """Roll, pitch, yaw in radians from the unit quaternion w, x, y, z."""
+        topic = self.log.topic("vehicle_attitude", *(f"q[{part}]" for part in range(4)))
+        if topic is None:
+            return None
+        q = topic.vector("q", 4)
+        length = np.linalg.norm(q, axis=1)
+        sound = np.isfinite(length) & (length > 0.5) & (length < 2.0)
+        w, x, y, z = (q[sound] / length[sound, None]).T
+        roll = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
+        pitch = np.arcsin(np.clip(2 * (w * y - z * x), -1.0, 1.0))
+        yaw = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+        return _series(self._time(topic)[sound], np.stack([roll, pitch, yaw], axis=1))
+
+    def gyro(self) -> Series | None:
+        """Body rates in rad/s."""
+        return self._vector("vehicle_angular_velocity", "xyz") or self._vector(
+            "sensor_combined", "gyro_rad"
+        )
+
+    def accel(self) -> Series | None:
+        """Specific force in m/s²."""
+        return self._vector("vehicle_acceleration", "xyz") or self._vector(
+            "sensor_combined", "accelerometer_m_s2"
+        )
+
+    def throttle(self) -> Series | None:
+        """P of the compensation by thrust, 0 … 1: that of the moment, 0 while disarmed."""
+        new = self._thrust_setpoint()
+        old = self._thrust_control()
+        numbers = tuple(int(part) for part in self.version.split(".")[:2] if part.isdigit())
+        chosen = new or old if numbers >= _THRUST_TOPIC_ALONE or old is None else old
+        if chosen is None:
+            return None
+        value = np.where(self._armed_at(chosen.time), chosen.value, 0.0)
+        return _series(chosen.time, np.clip(value, 0.0, 1.0))
+
+    def _thrust_setpoint(self) -> Series | None:
+        thrust = self._vector("vehicle_thrust_setpoint", "xyz")
+        return None if thrust is None else Series(thrust.time, np.linalg.norm(thrust.value, axis=1))
+
+    def _thrust_control(self) -> Series | None:
+        topic = self.log.topic("actuator_controls_0", "control[3]")
+        return None if topic is None else _series(self._time(topic), topic.number("control[3]"))
+
+    def currents(self) -> dict[int, Series]:
+        """Amperes of each battery instance that has a current sensor.
+
+        Without one the firmware says −1 A, or 0 A throughout.
+        """
+        found = {}
+        for instance, topic in self.log.instances("battery_status", "current_a").items():
+            value = topic.number("current_a")
+            series = _series(self._said(topic), value, value != _NO_SENSOR)
+            if series is not None and series.value.any():
+                found[instance] = series
+        return found
+
+    def battery(self, currents: Mapping[int, Series]) -> int:
+        """The instance whose current the firmware multiplies, or could: 0 or 1."""
+        switched = stored(self.values, 1).compensation is Compensation.CURRENT_1
+        first, second = (1, 0) if switched else (0, 1)
+        return second if first not in currents and second in currents else first
+
+    def voltage(self, battery: int) -> Series | None:
+        """Volts of a battery instance."""
+        topic = self.log.topic("battery_status", "voltage_v", instance=battery)
+        return None if topic is None else _series(self._said(topic), topic.number("voltage_v"))
+
+    def outputs(self) -> Series | None:
+        """Motor outputs in microseconds, shape (n, 16); 0 where none is driven."""
+        parts = [f"control[{motor}]" for motor in range(_MOTORS)]
+        topic = self.log.topic("actuator_motors", *parts)
+        if topic is not None:
+            control = topic.vector("control", _MOTORS)
+            value = np.zeros((len(control), _OUTPUTS))
+            driven = np.isfinite(control)
+            value[:, :_MOTORS][driven] = 1000.0 + 1000.0 * np.clip(control[driven], 0.0, 1.0)
+            return _series(self._time(topic), value)
+        return self._servo_outputs()
+
+    def _servo_outputs(self) -> Series | None:
+        """Of whichever instance moves most: motors move more than what holds still in flight."""
+        parts = [f"output[{channel}]" for channel in range(_OUTPUTS)]
+        best, most = None, 0.0
+        for topic in self.log.instances("actuator_outputs", *parts).values():
+            value = topic.vector("output", _OUTPUTS)
+            sane = np.isfinite(value) & (value >= 800.0) & (value <= 2200.0)
+            value = np.where(sane, value, 0.0)
+            moved = float(np.ptp(value, axis=0).sum())
+            if moved > most:
+                best, most = Series(self._time(topic), value), moved
+        return best
+
+    def armed(self) -> Series | None:
+        """1 armed, 0 disarmed."""
+        if (topic := self.log.topic("vehicle_status", "arming_state")) is not None:
+            armed = topic.number("arming_state") == _ARMED
+        elif (topic := self.log.topic("actuator_armed", "armed")) is not None:
+            armed = topic.number("armed") > 0
+        else:
+            return None
+        return Series(self._said(topic), armed.astype(np.float64))
+
+    def _armed_at(self, time: FloatArray) -> BoolArray:
+        armed = self.armed()
+        if armed is None:
+            return np.ones(len(time), dtype=bool)
+        row = np.clip(np.searchsorted(armed.time, time, side="right") - 1, 0, None)
+        return np.asarray(armed.value[row] > 0.5)
+
+    def position(self) -> Series | None:
+        """Latitude and longitude in degrees, altitude above sea level in m."""
+        if (topic := self.log.topic("vehicle_global_position", "lat", "lon", "alt")) is not None:
+            value = np.stack([topic.number(name) for name in ("lat", "lon", "alt")], axis=1)
+            return _series(self._time(topic), value, _on_earth(value))
+        for topic in self._receivers():
+            if "latitude_deg" in topic:
+                names, units = ("latitude_deg", "longitude_deg", "altitude_msl_m"), (1.0, 1.0, 1.0)
+            elif "lat" in topic:
+                names, units = ("lat", "lon", "alt"), (1e-7, 1e-7, 1e-3)
+            else:
+                continue
+            value = np.stack([topic.number(name) for name in names], axis=1) * units
+            fixed = topic.number("fix_type") >= _FIX_3D
+            found = _series(self._time(topic), value, fixed & _on_earth(value))
+            if found is not None:
+                return found
+        return None
+
+    def start_unix_s(self) -> float:
+        """Unix time of time zero by satellite; NaN where none told it."""
+        for topic in self._receivers():
+            if "time_utc_usec" in topic:
+                utc = topic.number("time_utc_usec")
+                told = utc > _EARLIEST_UTC_US
+                if told.any():
+                    start = utc * MICROSECOND - self._said(topic)
+                    return float(np.median(start[told]))
+        return float("nan")
+
+    def _receivers(self) -> list[Topic]:
+        names = ("vehicle_gps_position", "sensor_gps")
+        return list(
+            itertools.chain(*(self.log.instances(name, "fix_type").values() for name in names))
+        )
+
+    def _vector(self, name: str, field: str) -> Series | None:
+        topic = self.log.topic(name, *(f"{field}[{axis}]" for axis in range(3)))
+        return None if topic is None else _series(self._time(topic), topic.vector(field, 3))
+
+    def _time(self, topic: Topic) -> FloatArray:
+        """When each row was measured, seconds, never decreasing."""
+        return self._seconds(topic.stamp())
+
+    def _said(self, topic: Topic) -> FloatArray:
+        """When each row was said, seconds."""
+        return self._seconds(topic.columns["timestamp"])
+
+    def _seconds(self, stamp: NDArray[Any]) -> FloatArray:
+        return (stamp.astype(np.float64) - float(self.zero)) * MICROSECOND
+
+
+def _on_earth(value: FloatArray) -> BoolArray:
+    latitude, longitude, altitude = value.T
+    sound = np.isfinite(value).all(axis=1) & (np.abs(latitude) <= 90.0)
+    sound &= (np.abs(longitude) <= 180.0) & (np.abs(altitude) < 20_000.0)
+    return np.asarray(sound & ((latitude != 0.0) | (longitude != 0.0)))
+
+
+def _series(time: FloatArray, value: FloatArray, rows: BoolArray | None = None) -> Series | None:
+    """Rows that are finite, in order of time; None where there is none."""
+    sound = np.isfinite(value).reshape(len(value), -1).all(axis=1)
+    if rows is not None:
+        sound &= rows
+    if not sound.any():
+        return None
+    time, value = time[sound], value[sound]
+    if (np.diff(time) < 0).any():
+        order = np.argsort(time, kind="stable")
+        time, value = time[order], value[order]
+    return Series(time, value)

@@ -1,0 +1,53 @@
+"""What the screens are given to draw: everything in hand at one instant, frozen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from magcomp.live.snapshot import LiveSnapshot
+from magcomp.tui.choices import Choice
+from magcomp.tui.work import Work, Writing
+
+
+@dataclass(frozen=True)
+class Busy:
+    """What is being done.
+
+    Attributes
+    ----------
+    what
+        In words.
+    share
+        Done, 0 … 1.
+    """
+
+    what: str
+    share: float = 0.0
+
+    @property
+    def sentence(self) -> str:
+        """For the next line."""
+        return f"Wait: {self.what} … {100 * self.share:.0f} %"
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Everything in hand.
+
+    Attributes
+    ----------
+    work, writing
+        One vehicle's or log's work, and what would be written or was.
+    live
+        The newest snapshot of the vehicle; None for a log.
+    busy
+        What is being done; None while nothing is.
+    choices
+        What can be connected to or opened.
+    """
+
+    work: Work = field(default_factory=Work)
+    writing: Writing = field(default_factory=Writing)
+    live: LiveSnapshot | None = None
+    busy: Busy | None = None
+    choices: tuple[Choice, ...] = ()
