@@ -26,7 +26,7 @@ check: lint
 benchmark: $(VENV)/installed-dev
 	@$(BIN)/python benchmarks/accuracy.py
 	@$(BIN)/python benchmarks/coverage.py --seeds 3
-	@$(BIN)/python benchmarks/read_tlog.py
+	@$(BIN)/python benchmarks/read.py
 	@$(BIN)/python benchmarks/fit_time.py
 
 $(VENV)/bin/python:

@@ -63,7 +63,7 @@ def readings(
             f"{recording.source} must hold the vehicle's attitude (message ATTITUDE); "
             "instead it holds none, and gravity cannot be known without it"
         )
-    keep = _is_new(reported.value)
+    keep = is_new(reported.value)
     keep &= (reported.time >= start) & (reported.time <= end)
     autopilot = autopilots.of(recording)
     applied = recording.applied.get(compass)
@@ -113,7 +113,8 @@ def _list_compasses(recording: Recording) -> str:
     return f"compass {', '.join(map(str, present))}" if present else "no compass at all"
 
 
-def _is_new(value: FloatArray) -> BoolArray:
+def is_new(value: FloatArray) -> BoolArray:
+    """Whether each reading, shape (n, 3), differs from the one before it; shape (n,)."""
     changed = np.any(np.diff(value, axis=0) != 0.0, axis=1)
     return np.concatenate([[True], changed])
 

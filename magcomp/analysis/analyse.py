@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,6 +11,8 @@ from magcomp import autopilots
 from magcomp.align import controls, expected_earth, has_position, readings, reported
 from magcomp.align.health import compass_complaints, current_complaints
 from magcomp.analysis.emit import Emission, emit
+from magcomp.analysis.multiplied import kinds_to_try, multiplied_notes, why_only_to_look_at
+from magcomp.analysis.vehicle_words import in_words_of
 from magcomp.earth import EarthField
 from magcomp.errors import MissingDataError, UsageError
 from magcomp.fit import METHODS, Problem, best_form, fit
@@ -121,14 +123,21 @@ def analyse(
     chosen = _choose(judged)
     emitted = emit(recording, [j.fit for j in judged[chosen]])
     nothing = all(j.verdict.grade is Grade.REJECTED for j in judged[chosen])
+    why_not = why_only_to_look_at(recording, chosen)
     return Analysis(
         source=recording.source,
         duration_s=recording.duration_s,
         vehicle=recording.vehicle,
         compasses=tuple(
-            _result(j, emitted[j.fit.compass], nothing_accepted=nothing) for j in judged[chosen]
+            _result(
+                j,
+                Emission({}, {}) if why_not else emitted[j.fit.compass],
+                nothing_accepted=nothing,
+            )
+            for j in judged[chosen]
         ),
         notes=tuple(_notes(recording, wanted, judged, chosen)),
+        only_to_look_at=why_not,
     )
 
 
@@ -167,7 +176,9 @@ def check(recording: Recording, options: Options | None = None) -> Mapping[int, 
                 f"Compass {compass} is corrected by {kind}, so {recording.source} must hold the "
                 f"{kind}; instead it holds {', '.join(by_kind)}"
             )
-        verdicts[compass] = judge_present(Problem(new, by_kind[kind], by_kind, earth))
+        verdicts[compass] = _in_words_of(
+            recording, judge_present(Problem(new, by_kind[kind], by_kind, earth))
+        )
     return verdicts
 
 
@@ -204,7 +215,12 @@ def _one(
     if problem.control.kind == CURRENT:
         complaints += current_complaints(recording)
     found, verdict = judge(problem, fit(problem, wanted.method), complaints=complaints)
-    return _Judged(problem, found, verdict)
+    return _Judged(problem, found, _in_words_of(recording, verdict))
+
+
+def _in_words_of(recording: Recording, verdict: Verdict) -> Verdict:
+    kind = recording.vehicle.kind
+    return replace(verdict, reasons=tuple(in_words_of(kind, each) for each in verdict.reasons))
 
 
 def _controls_of(recording: Recording) -> tuple[Control, ...]:
@@ -228,7 +244,7 @@ def _kinds(recording: Recording, found: Iterable[Control], wanted: Options) -> l
     """The control quantities to try, the reported ones first."""
     kinds = list(dict.fromkeys(control.kind for control in found))
     if wanted.regressor == "auto":
-        return kinds
+        return kinds_to_try(recording, kinds)
     if wanted.regressor not in kinds:
         raise MissingDataError(
             f"{recording.source} must hold a {wanted.regressor} that changes; instead it holds "
@@ -291,11 +307,7 @@ def _notes(
         yield "the log holds no battery current, so throttle is used"
     if not has_position(recording):
         yield "the log holds no position: the earth's field is taken from the readings themselves"
-    if recording.vehicle.kind not in ("copter", "unknown"):
-        yield (
-            f"the vehicle is a {recording.vehicle.kind}: magcomp is made for multirotors, whose "
-            "thrust demand is the throttle the autopilot multiplies"
-        )
+    yield from multiplied_notes(recording, chosen)
     autopilot = autopilots.of(recording)
     yield from autopilot.warnings(recording.parameters.latest)
     for compass, why in sorted(autopilot.left_out(recording.parameters).items()):

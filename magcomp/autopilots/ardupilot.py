@@ -47,7 +47,17 @@ from magcomp.autopilots.protocol import (
     ThrustCurve,
 )
 from magcomp.errors import InputError
-from magcomp.model import Compass, Correction, InForce, ParameterHistory, Recording, Series
+from magcomp.model import (
+    CURRENT,
+    THROTTLE,
+    Compass,
+    Correction,
+    InForce,
+    ParameterHistory,
+    Recording,
+    Series,
+    Vehicle,
+)
 
 _MOTOR_FUNCTIONS = frozenset([*range(33, 41), *range(82, 86)])
 _DEFAULT_MOTORS = 4
@@ -63,17 +73,30 @@ _LOGGED = LagPriors(LagPrior(0.05, 0.05), LagPrior(0.05, 0.1))
 """A reading is the mean over one update of 0.1 s, and is logged when it is made."""
 
 
+_WITHOUT_THROTTLE = frozenset(["plane", "rover", "boat"])
+
+_ALL_CURRENTS = (
+    "make battery 0 the sum of all (the BATT_MONITOR that sums selected monitors), and record again"
+)
 _LOG_BITS = {
-    "compass": "set the COMPASS bit of LOG_BITMASK and COMPASS_ENABLE to 1, and fly again",
+    "compass": "set the COMPASS bit of LOG_BITMASK and COMPASS_ENABLE to 1, and record again",
     "control": (
         "set the CURRENT and CTUN bits of LOG_BITMASK and give the log as the vehicle wrote it"
     ),
-    "attitude": "set the ATTITUDE bit of LOG_BITMASK, and fly again",
+    "current": "set up a current sensor (BATT_MONITOR) and set the CURRENT bit of LOG_BITMASK",
+    "all currents": _ALL_CURRENTS,
+    "attitude": "set the ATTITUDE bit of LOG_BITMASK, and record again",
+    "parameters": "give the whole log, which has them at its beginning",
+    "position": "set the GPS bit of LOG_BITMASK, and record where satellites are seen",
 }
 _LINK_MESSAGES = {
     "compass": "ask for RAW_IMU, SCALED_IMU2 or SCALED_IMU3 at 10 Hz, with COMPASS_ENABLE 1",
     "control": "was the vehicle ever armed, and does the link carry BATTERY_STATUS or VFR_HUD?",
+    "current": "set up a current sensor (BATT_MONITOR) and ask for BATTERY_STATUS at 10 Hz",
+    "all currents": _ALL_CURRENTS,
     "attitude": "ask for ATTITUDE at 20 Hz",
+    "parameters": "let the ground station read all parameters while it records",
+    "position": "ask for GLOBAL_POSITION_INT, and record where satellites are seen",
 }
 
 
@@ -87,6 +110,7 @@ class ArduPilot:
     switch = COMPENSATION_SWITCH
     compass_prefix = "COMPASS_"
     device_id_names = tuple(single_name("DEV_ID", compass) for compass in NUMBERS)
+    batteries = (0,)
     device_ids_describe = "bus, address and type of a sensor, which are alike in vehicles of a kind"
 
     def require_fittable(self, recording: Recording) -> None:
@@ -266,6 +290,10 @@ class ArduPilot:
     ) -> tuple[str, ...]:
         """Of vectors without their switch."""
         return tuple(ardupilot_settings.write_warnings(asked, values))
+
+    def multiplied(self, vehicle: Vehicle) -> tuple[str, ...]:
+        """The current; in copters and subs, which hand it to the compass, the throttle too."""
+        return (CURRENT,) if vehicle.kind in _WITHOUT_THROTTLE else (CURRENT, THROTTLE)
 
     def how_to_record(self, quantity: str, source_format: str) -> str:
         """A bit of LOG_BITMASK for its own log, a message for telemetry."""

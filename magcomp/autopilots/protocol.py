@@ -22,6 +22,7 @@ from magcomp.model import (
     ParameterHistory,
     Recording,
     Series,
+    Vehicle,
 )
 
 
@@ -196,6 +197,11 @@ class Autopilot(Protocol):
         ...
 
     @property
+    def batteries(self) -> tuple[int, ...]:
+        """Battery instances whose current the firmware can multiply."""
+        ...
+
+    @property
     def device_ids_describe(self) -> str:
         """What a device id says, in words, where it does not tell one vehicle from its twin."""
         ...
@@ -361,13 +367,18 @@ class Autopilot(Protocol):
         """
         ...
 
+    def multiplied(self, vehicle: Vehicle) -> tuple[str, ...]:
+        """The control quantities that the firmware of a kind of vehicle can multiply."""
+        ...
+
     def how_to_record(self, quantity: str, source_format: str) -> str:
         """What to set so that the next recording of a format holds a quantity.
 
         Parameters
         ----------
         quantity
-            ``"compass"``, ``"control"`` (current and throttle) or ``"attitude"``.
+            ``"compass"``, ``"control"`` (current and throttle), ``"current"``, ``"all currents"``
+            (of several batteries as one), ``"attitude"``, ``"parameters"`` or ``"position"``.
         source_format
             As in ``Recording.format``.
         """

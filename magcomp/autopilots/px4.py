@@ -43,6 +43,8 @@ from magcomp.autopilots.px4_rotation import sensor_to_body
 from magcomp.autopilots.px4_settings import NUMBERS
 from magcomp.errors import InputError, MissingDataError
 from magcomp.model import (
+    CURRENT,
+    THROTTLE,
     Compass,
     Correction,
     FloatArray,
@@ -50,6 +52,7 @@ from magcomp.model import (
     ParameterHistory,
     Recording,
     Series,
+    Vehicle,
 )
 
 FIRST_VERSION = (1, 12)
@@ -72,6 +75,7 @@ class Px4:
     switch = COMPENSATION_SWITCH
     compass_prefix = "CAL_MAG"
     device_id_names = tuple(single_name("ID", number) for number in NUMBERS)
+    batteries = (0, 1)
     device_ids_describe = "bus, address and type of a sensor, which are alike in vehicles of a kind"
 
     def require_fittable(self, recording: Recording) -> None:
@@ -234,6 +238,10 @@ class Px4:
     ) -> tuple[str, ...]:
         """Of vectors without their switch, and of a restart."""
         return tuple(px4_settings.write_warnings(asked, values))
+
+    def multiplied(self, vehicle: Vehicle) -> tuple[str, ...]:  # noqa: ARG002
+        """Thrust and current, whatever the vehicle."""
+        return (CURRENT, THROTTLE)
 
     def how_to_record(self, quantity: str, source_format: str) -> str:  # noqa: ARG002
         """A bit of SDLOG_PROFILE."""

@@ -27,6 +27,7 @@ class _Command(NamedTuple):
 COMMANDS = {
     "fit": _Command("magcomp.cli.fit", "Find the compensation in a log, judge it, write it."),
     "check": _Command("magcomp.cli.check", "Judge the calibration in force; fit nothing."),
+    "info": _Command("magcomp.cli.info", "What a log holds, and what it lacks for a fit."),
     "report": _Command("magcomp.cli.report", "Fit a log and write a report to look at."),
     "heading": _Command("magcomp.cli.heading", "Raw, corrected and gyro-fused heading of a log."),
     "reproduce": _Command("magcomp.cli.reproduce", "Carry out the paper's experiments again."),

@@ -37,6 +37,7 @@ from magcomp.live.upload import DISARM_S, new_file
 from magcomp.model import Analysis, Grade, ParameterSet, Recording
 from magcomp.report import as_json
 from magcomp.writing.files import SUFFIXES, write_parameter_file
+from magcomp.writing.writer import restore_command
 
 _Result = TypeVar("_Result")
 
@@ -309,5 +310,5 @@ def _upload(session: LiveSession, chosen: ParameterSet, wishes: Wishes) -> ExitC
             stop,
         )
     if code is ExitCode.GOOD:
-        complain(f"To undo this: magcomp restore {backup} {address}")
+        complain(f"To undo this:\n  {restore_command(backup, address)}")
     return code

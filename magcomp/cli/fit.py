@@ -19,7 +19,7 @@ from magcomp.cli.options import (
 )
 from magcomp.cli.output import answer, complain, look
 from magcomp.cli.work import fit_log
-from magcomp.errors import ExitCode
+from magcomp.errors import ExitCode, UsageError
 from magcomp.model import Grade
 from magcomp.report import as_json
 from magcomp.report import files as report_files
@@ -73,6 +73,8 @@ def fit(
     if report is not None:
         check_output(report, report_files.SUFFIXES, log, force=force)
     recording, analysis = fit_log(log, options, selection)
+    if output is not None and analysis.only_to_look_at:
+        raise UsageError(f"{output} must hold parameters; instead {analysis.only_to_look_at}")
     rejected = analysis.grade is Grade.REJECTED
     chosen = parameter_set(analysis, include_rejected=rejected and force)
     written = None

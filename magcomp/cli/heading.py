@@ -19,13 +19,12 @@ from magcomp.cli.heading_live import Following, follow, is_live
 from magcomp.cli.linking import LinkOptions, positive_seconds, reach_options
 from magcomp.cli.options import Selection, selection_options
 from magcomp.cli.output import answer, complain, look
-from magcomp.cli.work import fit_log
+from magcomp.cli.work import fit_log, read_log
 from magcomp.compensate import Gravity, Track, track
 from magcomp.errors import ExitCode, MissingDataError, ParameterFileError, UsageError
 from magcomp.experiments.motion import HeadingAccuracy, accuracy, heading_errors
 from magcomp.geometry import wrap_angle
 from magcomp.model import FloatArray, Grade, InForce, Recording, Series
-from magcomp.sources import read
 from magcomp.sources.truth import Truth, read_truth
 from magcomp.writing.files import read_parameter_file
 
@@ -33,6 +32,7 @@ _NAMES = ("raw", "corrected", "fused")
 _SIGNS = (".", "+", "•")
 _COLOURS = ("red", "blue", "green")
 _ROWS = 16
+_TELLS_TRUTH = "tlog"
 _WHOLE = (-math.inf, math.inf)
 _PLOT_LINES = 18
 
@@ -109,10 +109,11 @@ def heading(
         raise UsageError("Either --parameters or --in-force must be given; instead received both")
     compass = 1 if selection.compass is None else selection.compass
     if is_live(source):
-        if plot or gravity != "attitude" or (selection.start, selection.end) != _WHOLE:
+        of_a_log = (selection.start, selection.end, selection.battery, selection.attitude)
+        if plot or gravity != "attitude" or of_a_log != (*_WHOLE, None, None):
             raise UsageError(
-                f"--plot, --gravity, --start and --end must come with a log; instead received "
-                f"one with {source}"
+                f"--plot, --gravity, --start, --end, --battery and --attitude must come with a "
+                f"log; instead received one with {source}"
             )
         chosen = {} if parameters is None else _chosen(parameters, autopilots.ALL)
         wanted = Following(compass, chosen, positive_seconds(seconds) or math.inf, to_json)
@@ -131,7 +132,7 @@ def heading(
         start=selection.start,
         end=selection.end,
     )
-    found = _Answer(recording, made, origin, correction.regressor, _truth(log, selection))
+    found = _Answer(recording, made, origin, correction.regressor, _truth(recording, selection))
     if to_json:
         answer(json.dumps(_document(found), allow_nan=False) + "\n")
         return ExitCode.GOOD
@@ -157,7 +158,7 @@ def _correction(
             InForce(fit.correction, fit.regressor),
             (f"a fit of this log ({result.verdict.grade.value})"),
         )
-    recording = read(log, system=selection.system, component=selection.component)
+    recording = read_log(log, selection)
     autopilot, values = autopilots.of(recording), recording.parameters.latest
     if parameters is None:
         return recording, autopilot.in_force(values, compass), "the log's own parameters"
@@ -175,9 +176,11 @@ def _chosen(parameters: Path, known: Sequence[Autopilot]) -> Mapping[str, float]
     return chosen
 
 
-def _truth(log: Path, selection: Selection) -> Truth | None:
+def _truth(recording: Recording, selection: Selection) -> Truth | None:
+    if recording.format != _TELLS_TRUTH:
+        return None
     try:
-        return read_truth(log, system=selection.system, component=selection.component)
+        return read_truth(recording.source, system=selection.system, component=selection.component)
     except MissingDataError:
         return None
 

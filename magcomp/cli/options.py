@@ -53,6 +53,10 @@ class Selection:
         MAVLink system of the vehicle; None where the log holds only one.
     component
         MAVLink component of its autopilot; None for the usual one.
+    battery
+        Battery instance whose current is taken; None for the one that is usually multiplied.
+    attitude
+        Message that the attitude is taken from; None for the best.
     """
 
     compass: int | None
@@ -60,10 +64,12 @@ class Selection:
     end: float
     system: int | None
     component: int | None = None
+    battery: int | None = None
+    attitude: str | None = None
 
 
 def selection_options(command: Callable[..., _Result]) -> Callable[..., _Result]:
-    """Give a command --compass, --start, --end, --system and --component as one `Selection`."""
+    """Give a command the options of a `Selection`, by the names of its attributes."""
 
     @click.option("--compass", type=click.IntRange(1, 3), help="One compass; all by default.")
     @click.option(
@@ -71,6 +77,12 @@ def selection_options(command: Callable[..., _Result]) -> Callable[..., _Result]
     )
     @click.option(
         "--end", type=float, default=math.inf, metavar="S", help="Leave out what is after, s."
+    )
+    @click.option(
+        "--battery", type=click.IntRange(0, 15), metavar="N", help="Take the current of this one."
+    )
+    @click.option(
+        "--attitude", metavar="MESSAGE", help="Take the attitude of this message: see info."
     )
     @vehicle_options
     @functools.wraps(command)
@@ -80,9 +92,12 @@ def selection_options(command: Callable[..., _Result]) -> Callable[..., _Result]
         end: float,
         system: int | None,
         component: int | None,
+        battery: int | None,
+        attitude: str | None,
         **others: object,
     ) -> _Result:
-        return command(selection=Selection(compass, start, end, system, component), **others)
+        selection = Selection(compass, start, end, system, component, battery, attitude)
+        return command(selection=selection, **others)
 
     return with_selection
 

@@ -18,13 +18,22 @@ Step = Callable[[str, float], None]
 _LEAST_COLUMNS, _MOST_COLUMNS = 80, 100
 
 
+_COMMAND = "\n  magcomp "
+
+
 def complain(message: str) -> None:
-    """Write one sentence to stderr."""
-    # A name in a message may hold anything, also what a terminal would obey.
-    sentence = "".join(c if c.isprintable() else "?" for c in " ".join(message.split()))
-    if sentence and sentence[-1] not in ".!?":
+    """Write one sentence to stderr, and the command it ends with on a line of its own."""
+    said, _, command = message.partition(_COMMAND)
+    sentence = _printable(said)
+    if sentence and sentence[-1] not in ".!?:":
         sentence += "."
-    _write(sys.stderr, f"magcomp: {sentence}\n")
+    line = f"{_COMMAND}{_printable(command)}" if command else ""
+    _write(sys.stderr, f"magcomp: {sentence}{line}\n")
+
+
+def _printable(text: str) -> str:
+    # A name in a message may hold anything, also what a terminal would obey.
+    return "".join(c if c.isprintable() else "?" for c in " ".join(text.split()))
 
 
 def answer(text: str) -> None:

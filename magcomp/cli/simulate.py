@@ -103,7 +103,7 @@ def simulate(
     def announce(reached_at: str) -> None:
         complain(
             f"A simulated vehicle (seed {seed}) waits for a ground station, then: {program}, "
-            f"{vehicle.duration_s / speed:.0f} s. Reach it with: magcomp calibrate {reached_at}"
+            f"{vehicle.duration_s / speed:.0f} s. Reach it with:\n  magcomp calibrate {reached_at}"
         )
         answer(f"{reached_at}\n")
 

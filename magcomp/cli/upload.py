@@ -28,6 +28,7 @@ from magcomp.live.upload import make_plan, new_file, wait_disarmed, write_plan
 from magcomp.model import ParameterSet, Vehicle
 from magcomp.writing.files import read_parameter_file
 from magcomp.writing.plan import WritePlan
+from magcomp.writing.writer import restore_command
 
 backup_option = click.option(
     "--backup",
@@ -180,7 +181,7 @@ class VehicleLink:
                 stop,
             )
         if code is ExitCode.GOOD:
-            complain(f"To undo this: magcomp restore {backup} {address}")
+            complain(f"To undo this:\n  {restore_command(backup, address)}")
         return code, plan
 
     def _plan(self, wanted: ParameterSet, writing: Writing) -> WritePlan:

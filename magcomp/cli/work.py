@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from magcomp.analysis import Options, analyse, check
+from magcomp.analysis.choose import with_attitude, with_battery
 from magcomp.cli.options import Selection
 from magcomp.cli.output import progress
 from magcomp.model import Analysis, Recording, Verdict
@@ -37,5 +38,16 @@ def check_log(
         return recording, check(recording, options)
 
 
+def read_log(log: Path, selection: Selection) -> Recording:
+    """Read a log."""
+    with progress() as step:
+        return _read(log, selection, lambda share: step("reading the log", share))
+
+
 def _read(log: Path, selection: Selection, progress: Callable[[float], None]) -> Recording:
-    return read(log, system=selection.system, component=selection.component, progress=progress)
+    recording = read(log, system=selection.system, component=selection.component, progress=progress)
+    if selection.battery is not None:
+        recording = with_battery(recording, selection.battery)
+    if selection.attitude is not None:
+        recording = with_attitude(recording, selection.attitude)
+    return recording

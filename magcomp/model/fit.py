@@ -138,6 +138,9 @@ class MotorFit:
         Range of the control quantity the data cover (2nd and 98th percentile).
     count
         Readings used.
+    kept
+        Whether the correction is the one that was in force, because the data cannot tell it from
+        a better one.
     """
 
     compass: int
@@ -158,6 +161,7 @@ class MotorFit:
     u_low: float
     u_high: float
     count: int
+    kept: bool = False
 
     @property
     def interference(self) -> FloatArray:
@@ -306,6 +310,9 @@ class Analysis:
         One result a compass, in order.
     notes
         What a user should know of the recording: what was missing, what was left out.
+    only_to_look_at
+        Why no parameters follow from it, whatever the verdict: the firmware cannot multiply what
+        it was fitted against. Empty where it can.
     """
 
     source: str
@@ -313,6 +320,7 @@ class Analysis:
     vehicle: Vehicle
     compasses: tuple[CompassResult, ...]
     notes: tuple[str, ...]
+    only_to_look_at: str = ""
 
     @property
     def grade(self) -> Grade:

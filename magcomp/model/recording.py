@@ -269,6 +269,10 @@ class Recording:
         (dataflash does); empty where only parameters tell.
     raw_compasses
         Compasses whose ``field`` is the sensor's own, turned into body axes and not corrected.
+    attitude_source
+        Message that ``attitude`` is from; empty where there is none.
+    other_attitudes
+        Messages that tell the attitude too, the better ones first, to what they tell.
     """
 
     source: str
@@ -292,3 +296,5 @@ class Recording:
     other_currents: Mapping[int, Series] = dataclasses.field(default_factory=dict)
     applied: Mapping[int, Applied] = dataclasses.field(default_factory=dict)
     raw_compasses: frozenset[int] = frozenset()
+    attitude_source: str = ""
+    other_attitudes: Mapping[str, Series] = dataclasses.field(default_factory=dict)

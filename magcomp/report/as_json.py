@@ -39,7 +39,7 @@ def analysis_object(analysis: Analysis, written: str | None = None) -> dict[str,
         The parameter file it went to, if any.
     """
     return {
-        **_head(analysis.source, analysis.duration_s, analysis.vehicle),
+        **head(analysis.source, analysis.duration_s, analysis.vehicle),
         "verdict": analysis.grade.value,
         "compasses": [_compass(result) for result in analysis.compasses],
         "notes": list(analysis.notes),
@@ -52,7 +52,7 @@ def check_object(
 ) -> dict[str, Any]:
     """What ``magcomp check --json`` prints."""
     return {
-        **_head(recording.source, recording.duration_s, recording.vehicle),
+        **head(recording.source, recording.duration_s, recording.vehicle),
         "compasses": [
             {
                 "compass": compass,
@@ -77,7 +77,8 @@ def dumps(document: Mapping[str, Any]) -> str:
     return json.dumps(_finite(document), indent=2, allow_nan=False) + "\n"
 
 
-def _head(source: str, duration_s: float, vehicle: Vehicle) -> dict[str, Any]:
+def head(source: str, duration_s: float, vehicle: Vehicle) -> dict[str, Any]:
+    """What every object of a log begins with."""
     return {
         "magcomp": __version__,
         "source": source,

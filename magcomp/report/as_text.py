@@ -272,7 +272,10 @@ def _ending(
 ) -> Iterator[RenderableType]:
     yield Text()
     accepted = analysis.grade is not Grade.REJECTED
-    if written is not None:
+    if analysis.only_to_look_at:
+        yield _last("Nothing to write.", words.sentence(analysis.only_to_look_at))
+        accepted = False
+    elif written is not None:
         yield _last(f"Written to {words.printable(written)}.", _AFTER_WRITING)
     elif accepted:
         yield _last("Nothing is written yet.", "Add -o compass.param to write these parameters.")

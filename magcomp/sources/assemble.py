@@ -165,6 +165,7 @@ def _recording(decoded: Decoded, source: str, kind: str) -> Recording:
     changes = quantities.parameters(messages, who.autopilot, simulation=False)
     parameters = ParameterHistory(tuple(changes), quantities.holds_whole_list(messages))
     heartbeats = messages[Message.HEARTBEAT]
+    attitude = quantities.attitude(messages)
     return Recording(
         source=source,
         vehicle=Vehicle(
@@ -182,7 +183,8 @@ def _recording(decoded: Decoded, source: str, kind: str) -> Recording:
         field=quantities.field(messages),
         parameters=parameters,
         report=decoded.report,
-        attitude=quantities.attitude(messages),
+        attitude=attitude,
+        attitude_source="" if attitude is None else Message.ATTITUDE.name,
         gyro=quantities.gyro(messages),
         accel=quantities.accel(messages),
         throttle=quantities.throttle(messages),

@@ -33,6 +33,7 @@ class Reason(Enum):
     TIMEOUT = "timeout"
     STOPPED = "stopped"
     JOURNAL = "journal cannot be written"
+    ERROR = "an error in the program"
 
 
 class Standing(Enum):

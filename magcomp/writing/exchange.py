@@ -39,7 +39,7 @@ class Timing:
         Longest time a message may spend on its way. After this long without
         sending, nothing sent earlier can still take effect.
     storing
-        Time in which an autopilot has stored a write for good.
+        Time in which an autopilot has stored a write for good, where it writes in the background.
     silence
         Time without any message after which the link is lost.
     heartbeat_gap
@@ -55,11 +55,11 @@ class Timing:
     window: int = 12
     attempts: int = 25
     quiet: float = 2.0
-    storing: float = 0.3
+    storing: float = 1.0
     silence: float = 10.0
     heartbeat_gap: float = 5.0
     restarts: int = 8
-    limit: float = 180.0
+    limit: float = 120.0
 
 
 @dataclass

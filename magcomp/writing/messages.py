@@ -25,6 +25,7 @@ from magcomp.mavlink.parameters import (
     encode_value,
     encoding,
 )
+from magcomp.mavlink.version import unique_id
 from magcomp.model import Vehicle
 
 _DENIED = re.compile(r"Param write denied \((\w{1,16})\)")
@@ -60,11 +61,26 @@ class BootTime:
 
 
 @dataclass(frozen=True)
+class Pong:
+    """The answer to a `Ping`: its token, and seconds since the autopilot started."""
+
+    token: int
+    seconds: float
+
+
+@dataclass(frozen=True)
+class OwnNumber:
+    """The flight controller's own number, empty where it has none; see ``Vehicle.uid``."""
+
+    uid: str
+
+
+@dataclass(frozen=True)
 class Heard:
     """The vehicle said something else."""
 
 
-Incoming = ParamValue | ParamRefused | Heartbeat | BootTime | Heard
+Incoming = ParamValue | ParamRefused | Heartbeat | BootTime | Pong | OwnNumber | Heard
 
 
 @dataclass(frozen=True)
@@ -95,7 +111,19 @@ class SetValue:
     type: int = REAL32
 
 
-Outgoing = ReadAll | ReadIndex | ReadName | SetValue
+@dataclass(frozen=True)
+class Ping:
+    """Ask for nothing but an answer (TIMESYNC): all that was sent before arrives before it."""
+
+    token: int
+
+
+@dataclass(frozen=True)
+class AskOwnNumber:
+    """Ask for the flight controller's own number (AUTOPILOT_VERSION)."""
+
+
+Outgoing = ReadAll | ReadIndex | ReadName | SetValue | Ping | AskOwnNumber
 
 
 @dataclass(frozen=True)
@@ -147,6 +175,11 @@ def encode(message: Outgoing, peer: Peer) -> mavlink.MAVLink_message:
         case SetValue(name, value, kind):
             sent = as_float(encode_value(value, kind, peer.encoding))
             return mavlink.MAVLink_param_set_message(*to, _padded(name), sent, kind)
+        case Ping(token):
+            return mavlink.MAVLink_timesync_message(0, token)
+        case AskOwnNumber():
+            asked = (mavlink.MAV_CMD_REQUEST_MESSAGE, 0, mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
+            return mavlink.MAVLink_command_long_message(*to, *asked, 0, 0, 0, 0, 0, 0)
 
 
 def _param_value(message: Any, peer: Peer) -> Incoming:
@@ -167,11 +200,21 @@ def _param_error(message: Any, _: Peer) -> Incoming:
     return ParamRefused(_name(message), reason)
 
 
+def _timesync(message: Any, _: Peer) -> Incoming:
+    return Pong(message.ts1, message.tc1 * 1e-9) if message.tc1 > 0 else Heard()
+
+
+def _own_number(message: Any, _: Peer) -> Incoming:
+    return OwnNumber(unique_id(bytes(message.uid2), message.uid))
+
+
 _DECODERS: Mapping[str, Callable[[Any, Peer], Incoming]] = {
     "PARAM_VALUE": _param_value,
     "HEARTBEAT": _heartbeat,
     "STATUSTEXT": _status_text,
     "PARAM_ERROR": _param_error,
+    "TIMESYNC": _timesync,
+    "AUTOPILOT_VERSION": _own_number,
 }
 
 

@@ -6,8 +6,8 @@ Stages and what leaves them
 stage    sends, a window at a time               then    on silence another value
 ======== ======================================= ======= ========== ==================
 COMPARE  a read of identity and all old values   OFF     over       over
-OFF      a write of 0 to the switches            WRITE   OFF        OFF
-WRITE    a write of each value still to confirm  VERIFY  OFF        OFF
+OFF      a write of 0 to the switches            WRITE   again      again
+WRITE    a write of each value still to confirm  VERIFY  again/OFF  again
 VERIFY   a read of all values, switches still 0  ON      roll back  SETTLE
 ON       one write of the target's switches      CONFIRM a read     VERIFY
 CONFIRM  a read of the switches                  OVER    roll back  SETTLE
@@ -32,15 +32,18 @@ Rules
    index. An echo of another value may be stale, or a sibling's (setting _X
    echoes _Y and _Z): it is counted, not believed, and the write repeated
    together with a read, because ArduPilot answers an unknown name with silence.
-4. ArduPilot stores a write some time after its echo, in order; a reboot may
-   take the newest back. Silence may be such a reboot. So after silence no
-   value is written before the switches are confirmed 0 anew, and no switch
-   before the values are: only reads and OFF are simply repeated. CONFIRM
-   waits ``storing`` seconds before it asks.
+4. An autopilot stores a write some time after its echo, in any order; a reboot
+   may take back what is not stored. So OFF, WRITE and ON are each followed by
+   ``storing`` seconds in which nothing is changed: a reboot then takes back only
+   what one stage wrote, even after the program died. A vehicle that says nothing
+   at all for ``quiet`` seconds may be rebooting: no value is written before the
+   switches are confirmed 0 anew. ON is written once; values come before it again.
 5. Boot time going back, or a gap in the heartbeat, may be a reboot or another
    vehicle: nothing known before counts. SETTLE, and identity is read again.
-6. Whoever delays messages, delays them at most ``quiet`` seconds. So SETTLE
-   waits that long, and so does WRITE after an OFF that had to be repeated: a
+6. An answer may be older than its question. VERIFY and CONFIRM, which are
+   believed, ask behind a fence (fence.py), when everything sent before has
+   come, and end with another, when boot time has been seen once more. SETTLE, and
+   WRITE after an OFF that had to be repeated, wait ``quiet`` seconds besides: a
    late copy of an old write cannot undo a newer one unseen.
 7. Refusal, silence, a lost link and a request to stop roll back, once.
    A roll-back that fails leaves the switches 0 where they had been confirmed.
@@ -48,9 +51,7 @@ Rules
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping
-from dataclasses import replace
 
 from magcomp.mavlink.parameters import REAL32, ParamValue, fits
 from magcomp.writing.events import (
@@ -67,11 +68,15 @@ from magcomp.writing.events import (
     Written,
 )
 from magcomp.writing.exchange import Exchange, Timing
+from magcomp.writing.fence import Fence
 from magcomp.writing.files import format_value
 from magcomp.writing.messages import (
+    AskOwnNumber,
     Incoming,
     Outgoing,
+    OwnNumber,
     ParamRefused,
+    Pong,
     ReadName,
     SetValue,
 )
@@ -89,9 +94,14 @@ _NEXT = {
     Stage.IDENTIFY: Stage.OFF,
 }
 _WRITING = frozenset({Stage.OFF, Stage.WRITE, Stage.ON})
-_ROUNDS = frozenset({Stage.OFF, Stage.WRITE})  # written once, then all over again from OFF
+_REPEATED = frozenset({Stage.OFF, Stage.WRITE})
+_FENCED = frozenset({Stage.SETTLE, Stage.VERIFY, Stage.CONFIRM})
+_PINGING = _FENCED | {Stage.COMPARE}  # in COMPARE, to learn whether and how fast it answers
+_CLOSED = frozenset({Stage.VERIFY, Stage.CONFIRM})  # with a second fence behind their answers
+_OWN_NUMBER = "AUTOPILOT_VERSION"
 _BELIEVED_READS = 2
 _BELIEVED_ECHOES = 12  # at 30 % loss a good write is lost that often once in 10⁶
+_BELIEVED_REFUSALS = 8
 _GATE = 0.2
 
 
@@ -126,12 +136,14 @@ class WriteSequence:
         self._expected: Mapping[str, float] = {}
         self._exchange: Exchange[str] = Exchange((), self._timing)
         self._watch = VehicleWatch(now, self._timing)
-        self._not_before = now
+        self._fence = Fence(now, self._timing)
+        self._closing = False
+        self._doubtful = False
+        self._not_before = self._late_off = now
+        self._first_asked: dict[str, float] = {}
         self._unconfirmed: dict[str, float] = {}
-        self._rounds: Counter[Stage] = Counter()
-        self._other_values: Counter[str] = Counter()
+        self._refusals = 0
         self._restarts = 0
-        self._repeats = False
         self._touched = False
         self._switched_off = False
         self.outcome: Outcome | None = None
@@ -148,7 +160,9 @@ class WriteSequence:
         """Take what the vehicle said."""
         if self.finished:
             return
-        interruption = self._watch.hear(message, now)
+        interruption = self._watch.hear(message, now, self._fence.round_trip)
+        if isinstance(message, Pong):
+            self._fence.hear(message, now)
         if self._watch.armed:
             self._end(Reason.ARMED, "the vehicle is armed")
         elif interruption:
@@ -157,6 +171,8 @@ class WriteSequence:
             self._take_value(message, now)
         elif isinstance(message, ParamRefused) and self._exchange.differ(message.name):
             self._fail(Reason.REFUSED, f"{message.name} was not taken: {message.reason}", now)
+        elif isinstance(message, OwnNumber):
+            self._take_own_number(message.uid)
 
     def poll(self, now: float) -> tuple[list[Event], list[Outgoing]]:
         """Tell what has happened, then what is to be sent.
@@ -166,21 +182,27 @@ class WriteSequence:
         self._check_patience(now)
         while not self.finished and self._is_complete(now):
             self._leave(now)
-        if self.stage in _ROUNDS and self._exchange.unanswered(now):
-            self._break_off_round(now)
+        if self.stage is Stage.WRITE and self._watch.silence(now) > self._timing.quiet:
+            self._doubtful = True
+            self._enter(Stage.OFF, now)
         outgoing = [] if self.finished else self._ask(now)
+        if self.stage in _PINGING:
+            outgoing += self._fence.ask(now)
         events, self._events = self._events, []
         return events, outgoing
 
     def wake(self, now: float) -> float:
         """When to poll next, if nothing arrives before."""
-        if not self._exchange.open:
-            due = max(now, self._not_before)
-        elif self._gate_closed(now):
-            due = max(now + _GATE, self._not_before)
+        is_open, closed = bool(self._exchange.open), self._gate_closed(now)
+        if self.stage in _FENCED and (closed or not is_open):
+            due = max(self._not_before, self._fence.wake(now))
+        elif not is_open:
+            due = self._leaves_at
+        elif closed:
+            due = now + _GATE
         else:
             due = self._exchange.wake(now)
-        return min(due, self._watch.silent_from)
+        return min(max(due, now), self._watch.silent_from)
 
     def stop(
         self, now: float, reason: Reason = Reason.STOPPED, why: str = "it was interrupted"
@@ -205,13 +227,22 @@ class WriteSequence:
         if not self._exchange.answer(name):
             return
         self._types[name] = message.type
+        self._fence.answered(now - self._first_asked.pop(name, now))
         if self.stage in _WRITING:
             self._events.append(Written(name, wanted))
+            self._not_before = max(self._not_before, now + self._timing.storing)
         if self.stage is Stage.WRITE:
             del self._unconfirmed[name]
-            self._rounds[Stage.WRITE] = 0
         done, total = self._exchange.answered, self._exchange.total
         self._events.append(Progress(self.stage, name, done, total))
+
+    def _take_own_number(self, uid: str) -> None:
+        wanted = self._plan.vehicle.uid
+        if uid and wanted and uid != wanted:
+            why = f"the flight controller must be {wanted}; instead it is {uid}"
+            self._end(Reason.ANOTHER_VEHICLE, why)
+        elif uid:
+            self._exchange.answer(_OWN_NUMBER)
 
     def _take_other_value(self, name: str, value: float, now: float) -> None:
         count = self._exchange.differ(name)
@@ -221,14 +252,16 @@ class WriteSequence:
             if count >= _BELIEVED_READS:
                 self._believe(name, value, now)
             return
-        repeated = self._exchange.attempts(name) > 1
-        if count == self._exchange.attempts(name):
-            self._other_values[name] += 1
-        if self._other_values[name] >= _BELIEVED_ECHOES:
-            self._believe(name, value, now)
-        elif self.stage is Stage.ON and repeated:
-            # The one write was lost: the values first, then the switch again.
-            self._enter(Stage.VERIFY, now)
+        if self.stage is not Stage.ON:
+            if count >= _BELIEVED_ECHOES:
+                self._believe(name, value, now)
+        elif self._exchange.attempts(name) > 1:
+            self._refusals += 1
+            if self._refusals >= _BELIEVED_REFUSALS:
+                self._believe(name, value, now)
+            else:
+                # The one write was lost: the values first, then the switch again.
+                self._enter(Stage.VERIFY, now)
 
     def _believe(self, name: str, value: float, now: float) -> None:
         wanted = self._expected[name]
@@ -250,7 +283,7 @@ class WriteSequence:
         if self.finished:
             return
         silence, limit = self._timing.silence, self._timing.limit
-        silent = () if self.stage in _ROUNDS else self._exchange.unanswered(now)
+        silent = self._exchange.unanswered(now)
         if self._watch.is_silent(now):
             self._fail(Reason.LINK_LOST, f"nothing was heard for {silence:.0f} s", now)
         elif self._watch.is_overdue(now):
@@ -261,8 +294,11 @@ class WriteSequence:
             and self._watch.is_without_heartbeat(now)
         ):
             self._fail(Reason.LINK_LOST, f"no heartbeat came for {silence:.0f} s", now)
+        elif self.stage in _FENCED and self._fence.exhausted():
+            self._fail(Reason.TIMEOUT, "the vehicle answers no TIMESYNC any more", now)
         elif silent:
-            why = f"{silent[0]} was not answered in {self._timing.attempts} attempts"
+            verb = "confirmed" if self.stage in _WRITING else "answered"
+            why = f"{silent[0]} was not {verb} in {self._timing.attempts} attempts"
             self._fail(Reason.TIMEOUT, why, now)
 
     def _enter(self, stage: Stage, now: float) -> None:
@@ -280,25 +316,38 @@ class WriteSequence:
         }
         self.stage = stage
         self._expected = expected.get(stage, {})
-        timing = replace(self._timing, attempts=1) if stage in _ROUNDS else self._timing
-        self._exchange = Exchange(self._expected, timing)
+        asked = [*self._expected]
+        if self._plan.vehicle.uid and stage in {Stage.COMPARE, Stage.IDENTIFY}:
+            asked.append(_OWN_NUMBER)
+        self._exchange = Exchange(asked, self._timing)
+        self._first_asked.clear()
+        self._closing = False
         if stage is Stage.SETTLE:
             self._begin_values()
-            self._not_before = now + self._timing.quiet
-        if stage is Stage.CONFIRM:
-            self._not_before = now + self._timing.storing
+            self._doubtful = True
+            self._not_before = now + self._fence.quiet
+        if stage in _FENCED:
+            self._fence.up(now)
         if stage in _WRITING and self._expected:
             self._events.append(Intends(stage, dict(self._expected)))
 
     def _begin_values(self) -> None:
         self._unconfirmed = dict(self._values)
-        self._rounds.clear()
-        self._other_values.clear()
+        self._refusals = 0
+
+    @property
+    def _leaves_at(self) -> float:
+        """When the stage may end; WRITE not before the last copy of an OFF has come."""
+        late = self._late_off if self.stage is Stage.WRITE else self._not_before
+        return max(self._not_before, late)
 
     def _is_complete(self, now: float) -> bool:
-        if self._exchange.open:
+        if self._exchange.open or now < self._leaves_at:
             return False
-        return self.stage not in {Stage.SETTLE, Stage.WRITE} or now >= self._not_before
+        if self.stage in _CLOSED and not self._closing:
+            self._closing = True
+            self._fence.up(now)
+        return self.stage not in _FENCED or self._fence.passed(now, doubtful=self._doubtful)
 
     def _leave(self, now: float) -> None:
         if self.stage is Stage.COMPARE and not self._all_fit():
@@ -306,26 +355,10 @@ class WriteSequence:
         if self.stage is Stage.CONFIRM:
             self._complete()
             return
-        self._switched_off = self.stage in _ROUNDS
-        if self.stage is Stage.OFF:
-            self._rounds[Stage.OFF] = 0
+        if self.stage in _FENCED:
+            self._doubtful = False
+        self._switched_off = self.stage in _REPEATED
         self._enter(_NEXT[self.stage], now)
-
-    def _break_off_round(self, now: float) -> None:
-        self._exchange.halt()
-        if not self._exchange.idle(now):
-            return
-        self._rounds[self.stage] += 1
-        rounds = self._rounds[self.stage]
-        if rounds >= self._timing.attempts:
-            why = f"{self._exchange.open[0]} was not confirmed in {rounds} attempts"
-            self._fail(Reason.TIMEOUT, why, now)
-            return
-        if self.stage is Stage.OFF:
-            self._not_before = now + self._timing.quiet
-        self._switched_off = False
-        self._repeats = True
-        self._enter(Stage.OFF, now)
 
     def _all_fit(self) -> bool:
         for name, value in {**self._values, **self._switches}.items():
@@ -339,8 +372,15 @@ class WriteSequence:
             return []
         outgoing: list[Outgoing] = []
         for name, attempt in self._exchange.ask(now):
-            again = attempt > 1 or (self._repeats and self.stage in _ROUNDS)
-            if self.stage in _ROUNDS or (self.stage is Stage.ON and attempt == 1):
+            if name == _OWN_NUMBER:
+                outgoing.append(AskOwnNumber())
+                continue
+            again = attempt > 1
+            self._doubtful = self._doubtful or again
+            self._first_asked.setdefault(name, now)
+            if again and self.stage is Stage.OFF:
+                self._late_off = now + self._fence.quiet
+            if self.stage in _REPEATED or (self.stage is Stage.ON and not again):
                 self._touched = True
                 kind = self._types.get(name, REAL32)
                 outgoing.append(SetValue(name, self._expected[name], kind))
@@ -349,9 +389,10 @@ class WriteSequence:
         return outgoing
 
     def _gate_closed(self, now: float) -> bool:
-        """Whether a write waits for a heartbeat that says disarmed, or CONFIRM for the storage."""
-        if self.stage is Stage.CONFIRM:
-            return now < self._not_before
+        """Whether a write waits for a heartbeat that says disarmed, or a read for its fence."""
+        if self.stage in _CLOSED and not self._closing:
+            passed = self._fence.passed(now, doubtful=self._doubtful)
+            return now < self._not_before or not passed
         return self.stage in _WRITING and not self._watch.is_known_disarmed(now)
 
     def _restart(self, reason: Reason, why: str, now: float) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from magcomp.writing.exchange import Timing
-from magcomp.writing.messages import BootTime, Heartbeat, Incoming
+from magcomp.writing.messages import BootTime, Heartbeat, Incoming, Pong
 
 _REORDERING = 2.0  # seconds by which boot time may go back without a reboot
 
@@ -29,7 +29,8 @@ class VehicleWatch:
         self._since = now
         self._heard = now
         self._heartbeat: float | None = None
-        self._boot_time = 0.0
+        # Two clocks, because nothing says that they began together.
+        self._boot_times: dict[type[Incoming], float] = {}
         self.armed = False
 
     def renew(self, now: float) -> None:
@@ -37,8 +38,14 @@ class VehicleWatch:
         self._since = self._heard = now
         self._heartbeat = None
 
-    def hear(self, message: Incoming, now: float) -> str:
-        """Take what the vehicle said; tells why it may have rebooted, or nothing."""
+    def hear(self, message: Incoming, now: float, reordering: float = _REORDERING) -> str:
+        """Take what the vehicle said; tells why it may have rebooted, or nothing.
+
+        Parameters
+        ----------
+        reordering
+            Seconds by which messages overtake each other.
+        """
         self._heard = now
         match message:
             case Heartbeat(armed):
@@ -46,9 +53,12 @@ class VehicleWatch:
                 before, self._heartbeat = self._heartbeat, now
                 if before is not None and now - before > self._timing.heartbeat_gap:
                     return f"no heartbeat came for {now - before:.0f} s"
-            case BootTime(seconds):
-                before, self._boot_time = self._boot_time, seconds
-                if seconds < before - _REORDERING:
+            case BootTime(seconds) | Pong(seconds=seconds):
+                before = self._boot_times.get(type(message), 0.0)
+                self._boot_times[type(message)] = seconds
+                # One that started a moment ago cannot go back by much.
+                if seconds < before - min(max(reordering, _REORDERING), before / 2):
+                    self._boot_times = {type(message): seconds}
                     return "the vehicle rebooted"
             case _:
                 pass
@@ -59,6 +69,10 @@ class VehicleWatch:
         if self._heartbeat is None or now - self._heartbeat > self._timing.heartbeat_gap:
             return False
         return not self.armed
+
+    def silence(self, now: float) -> float:
+        """Seconds since anything was heard."""
+        return now - self._heard
 
     def is_silent(self, now: float) -> bool:
         """Whether the link counts as lost."""

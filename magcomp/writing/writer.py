@@ -7,6 +7,8 @@ clock and the disk.
 from __future__ import annotations
 
 import contextlib
+import functools
+import shlex
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
@@ -207,7 +209,7 @@ def write(
     """Write a plan to the vehicle and verify it, or put everything back.
 
     The backup and its journal are on the disk before the first write. Ctrl-C,
-    or `stop`, rolls back; a second Ctrl-C gives up at once.
+    `stop`, or an exception out of `on_event` rolls back; a second Ctrl-C gives up at once.
 
     Parameters
     ----------
@@ -229,50 +231,124 @@ def write(
         Where backup or journal cannot be created; then the vehicle is untouched.
     KeyboardInterrupt
         At the second Ctrl-C; `read_journal` tells what stands.
+    Exception
+        Whatever `on_event` or `stop` raised, after the roll-back, with a note of what stands.
     """
     if not plan.changes:
         return Outcome(Standing.NEW)
     write_parameter_file(backup, plan.backup)
     with Journal(backup, plan) as journal:
-        return _drive(plan, connection, journal, clock, on_event, stop, timing)
+        return _Drive(plan, connection, journal, clock, on_event, stop, timing).run()
 
 
-def _drive(
-    plan: WritePlan,
-    connection: Connection,
-    journal: Journal,
-    clock: Callable[[], float],
-    on_event: Callable[[Event], None],
-    stop: Callable[[], bool],
-    timing: Timing | None,
-) -> Outcome:
-    sequence = WriteSequence(plan, now=clock(), timing=timing)
-    journal_works = True
-    interrupted = False
+class _Drive:
+    """A write under way, whatever fails around it: the disk, the link, the user's own code."""
 
-    def tell(events: Sequence[Event]) -> None:
-        if journal_works:
-            journal.record(events)
-        for event in events:
-            on_event(event)
+    def __init__(
+        self,
+        plan: WritePlan,
+        connection: Connection,
+        journal: Journal,
+        clock: Callable[[], float],
+        on_event: Callable[[Event], None],
+        stop: Callable[[], bool],
+        timing: Timing | None,
+    ) -> None:
+        self._plan = plan
+        self._connection = connection
+        self._journal = journal
+        self._clock = clock
+        self._on_event = on_event
+        self._stop = stop
+        self._sequence = WriteSequence(plan, now=clock(), timing=timing)
+        self._journal_works = True
+        self._interrupted = False
+        self._failure: Exception | None = None
 
-    while sequence.outcome is None:
+    def run(self) -> Outcome:
+        """Go on until it has ended; raises what the user's code raised."""
+        sequence = self._sequence
+        while sequence.outcome is None:
+            try:
+                self._run()
+            except KeyboardInterrupt:
+                if self._interrupted:
+                    raise
+                self._interrupted = True
+                sequence.stop(self._clock())
+        with contextlib.suppress(OutputError):
+            self._tell(sequence.poll(self._clock())[0])
+        if self._failure is not None:
+            self._failure.add_note(f"While a vehicle was written; {stands(sequence.outcome)}.")
+            raise self._failure
+        return sequence.outcome
+
+    def _run(self) -> None:
+        peer = Peer.of(self._plan.vehicle)
         try:
-            run(sequence, connection, Peer.of(plan.vehicle), clock=clock, on_events=tell, stop=stop)
+            run(
+                self._sequence,
+                self._connection,
+                peer,
+                clock=self._clock,
+                on_events=self._tell,
+                stop=self._stopped,
+            )
         except LinkError as error:
-            sequence.abandon(str(error))
+            self._sequence.abandon(str(error))
         except OutputError as error:
             # Without journal nothing new may begin, but what was begun must be undone.
-            journal_works = False
-            sequence.stop(clock(), Reason.JOURNAL, str(error))
-        except KeyboardInterrupt:
-            if interrupted:
-                raise
-            interrupted = True
-            sequence.stop(clock())
-    with contextlib.suppress(OutputError):
-        tell(sequence.poll(clock())[0])
-    return sequence.outcome
+            self._journal_works = False
+            self._sequence.stop(self._clock(), Reason.JOURNAL, str(error))
+        except Exception as error:
+            if self._failure is not None:
+                self._sequence.abandon(_of_error(error))
+            self._fail(error)
+
+    def _fail(self, error: Exception) -> None:
+        self._failure = self._failure or error
+        self._sequence.stop(self._clock(), Reason.ERROR, _of_error(error))
+
+    def _tell(self, events: Sequence[Event]) -> None:
+        if self._journal_works:
+            self._journal.record(events)
+        for event in events:
+            self._guarded(functools.partial(self._on_event, event), None)
+
+    def _stopped(self) -> bool:
+        return self._guarded(self._stop, otherwise=False)
+
+    def _guarded(self, call: Callable[[], E], otherwise: E) -> E:
+        """Call the user's code; should it fail, undo what was begun and call it no more."""
+        if self._failure is not None:
+            return otherwise
+        try:
+            return call()
+        except Exception as error:
+            self._fail(error)
+            return otherwise
+
+
+def _of_error(error: Exception) -> str:
+    return f"of an error in the program ({type(error).__name__}: {error})"
+
+
+def stands(outcome: Outcome) -> str:
+    """What the vehicle holds, as a clause."""
+    return {
+        Standing.OLD: "the vehicle holds everything as before",
+        Standing.NEW: "the vehicle holds everything as wanted",
+        Standing.OFF: "the vehicle's motor compensation is off and some values are not restored",
+        Standing.UNSURE: (
+            "the vehicle holds everything as before, everything as wanted, "
+            "or has its motor compensation off"
+        ),
+    }[outcome.standing]
+
+
+def restore_command(backup: Path, address: str) -> str:
+    """What to type to bring a vehicle back."""
+    return f"magcomp restore {shlex.quote(str(backup))} {shlex.quote(address)}"
 
 
 def raise_for_failure(outcome: Outcome, backup: Path, address: str = "ADDRESS") -> None:
@@ -298,16 +374,7 @@ def raise_for_failure(outcome: Outcome, backup: Path, address: str = "ADDRESS") 
         Reason.TIMEOUT: LinkTimeoutError,
         Reason.JOURNAL: OutputError,
     }
-    stands = {
-        Standing.OLD: "the vehicle holds everything as before",
-        Standing.NEW: "the vehicle holds everything as wanted",
-        Standing.OFF: "the vehicle's motor compensation is off and some values are not restored",
-        Standing.UNSURE: (
-            "the vehicle holds everything as before, everything as wanted, "
-            "or has its motor compensation off"
-        ),
-    }
-    text = f"The write failed because {outcome.why}; {stands[outcome.standing]}."
+    text = f"The write failed because {outcome.why}; {stands(outcome)}."
     if outcome.standing in {Standing.OFF, Standing.UNSURE}:
-        text += f" Bring it back with: magcomp restore {backup} {address}"
+        text += f" Bring it back with:\n  {restore_command(backup, address)}"
     raise kinds.get(outcome.reason, WriteError)(text)

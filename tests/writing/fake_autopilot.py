@@ -2,8 +2,8 @@
 
 Faithful to AUTOPILOTS.md: silence for unknown names and non-finite values,
 echoes with index 65535 that bring the siblings of a vector along, read-only
-names, parameters that hide, values that survive a reboot unless the newest
-had not been stored yet.
+names, parameters that hide, and two memories: what is in force, and what a
+reboot brings back, into which writes go some time later and in any order.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ DEVICES = (97539, 131874, 263178)
 QUAD = Vehicle("ardupilot", "copter", SYSTEM, COMPONENT, "4.6.3", compasses_of(DEVICES))
 INT8, INT32, REAL32 = 2, 6, 9
 BOOT_TIME = 3.0  # seconds a reboot takes
-STORE_TIME = 0.1  # seconds until a write has reached the storage
+STORE_TIME = 0.8  # seconds until a write has surely reached the storage
 
 
 def float32(value: float) -> float:
@@ -83,8 +83,10 @@ class FakeAutopilot:
         self.denies_in_words = True
         self.reports_errors = False
         self.quiet_when_unchanged = False
+        self.answers_timesync = True
         self.armed = False
         self.booted_at = 0.0
+        self.stored = dict(self.values)
         self.unsaved: list[tuple[float, str, float]] = []
         self.writes: list[tuple[str, float]] = []
         self.states: list[dict[str, float]] = []
@@ -97,12 +99,13 @@ class FakeAutopilot:
         return [n for n in self.values if not (hidden and n.startswith("COMPASS_PMOT1"))]
 
     def reboot(self, now: float, stored: bool = True) -> None:
-        """Start again; unless `stored`, the newest writes had not reached the storage."""
-        while self.unsaved and not stored:
-            written_at, name, before = self.unsaved.pop()
-            if now - written_at < STORE_TIME:
-                self.values[name] = before
+        """Start again; unless `stored`, some of the newest writes had not reached the storage."""
+        luck = np.random.default_rng(round(1e6 * now))
+        for written_at, name, value in self.unsaved:
+            if stored or now - written_at >= STORE_TIME or luck.random() < 0.5:
+                self.stored[name] = value
         self.unsaved.clear()
+        self.values = dict(self.stored)
         self.states.append(self.calibration())
         self.booted_at = now + BOOT_TIME
 
@@ -126,6 +129,9 @@ class FakeAutopilot:
                 return [self._value(names[index], index)] if index < len(names) else []
             case "PARAM_SET":
                 return self._set(message.param_id, float32(message.param_value), now)
+            case "TIMESYNC" if message.tc1 == 0 and self.answers_timesync:
+                since = int(1e9 * max(0.0, now - self.booted_at)) + 1
+                return [mavlink.MAVLink_timesync_message(since, message.ts1)]
             case _:
                 return []
 
@@ -139,7 +145,7 @@ class FakeAutopilot:
             return [*words, *self._error(name, 5), self._value(name)]
         if self.quiet_when_unchanged and self.values[name] == value:
             return []
-        self.unsaved.append((now, name, self.values[name]))
+        self.unsaved.append((now, name, value))
         self.values[name] = value
         self.states.append(self.calibration())
         siblings = [name]
@@ -206,6 +212,7 @@ class FakeLink:
         self.before_message = before_message
         self.dead = False
         self.broken = False
+        self.reboots_at_the_end = False
         self.messages = 0
         self.strangers: list[Any] = []
         self._order = itertools.count()

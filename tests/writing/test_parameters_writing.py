@@ -6,9 +6,23 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from fake_autopilot import NEW, OLD, QUAD, WANTED, FakeAutopilot, FakeLink, Network, VirtualClock
+from fake_autopilot import (
+    NEW,
+    OLD,
+    QUAD,
+    SYSTEM,
+    WANTED,
+    FakeAutopilot,
+    FakeLink,
+    Network,
+    VirtualClock,
+    sign,
+)
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from magcomp.errors import LinkError, OutputError
 from magcomp.writing.events import Outcome, Standing
+from magcomp.writing.exchange import Timing
 from magcomp.writing.files import read_parameter_file
 from magcomp.writing.journal import read_journal
 from magcomp.writing.plan import plan
@@ -35,7 +49,7 @@ def assert_never_half_written(autopilot: FakeAutopilot) -> None:
         assert state["COMPASS_MOTCT"] == 0 or state in (OLD, NEW)
 
 
-def test_a_good_link_carries_three_compasses_in_less_than_two_seconds(tmp_path: Path) -> None:
+def test_a_good_link_adds_less_than_two_seconds_to_the_waits_for_storage(tmp_path: Path) -> None:
     autopilot, clock = FakeAutopilot(OLD), VirtualClock()
     link = FakeLink(autopilot, clock)
     current = read_current(link, QUAD, WANTED, clock=clock)
@@ -45,7 +59,7 @@ def test_a_good_link_carries_three_compasses_in_less_than_two_seconds(tmp_path: 
     assert outcome == Outcome(Standing.NEW)
     assert autopilot.calibration() == NEW
     assert len(todo.changes) == 37
-    assert clock.now - begin < 2.0
+    assert clock.now - begin < 3 * Timing().storing + 2.0
     assert_never_half_written(autopilot)
 
 
@@ -95,6 +109,20 @@ def is_killed(link: FakeLink) -> None:
     raise Killed
 
 
+def is_killed_and_then_the_vehicle_reboots(link: FakeLink) -> None:
+    link.reboots_at_the_end = True
+    raise Killed
+
+
+def a_stranger_confirms(link: FakeLink) -> None:
+    """From now on another system says, all the time, that everything is as wanted."""
+    link.strangers = [
+        sign(mavlink.MAVLink_param_value_message(name.encode(), value, 9, 40, 65535), SYSTEM, 2)
+        for name, value in NEW.items()
+    ]
+    link.dead = True
+
+
 def is_interrupted(link: FakeLink) -> None:
     raise KeyboardInterrupt
 
@@ -109,6 +137,8 @@ FAULTS = [
     reboots,
     reboots_before_the_newest_writes_are_stored,
     is_killed,
+    is_killed_and_then_the_vehicle_reboots,
+    a_stranger_confirms,
     is_interrupted,
     arms,
 ]
@@ -122,19 +152,21 @@ def messages_of_a_clean_write(folder: Path) -> int:
     return link.messages - before
 
 
+@pytest.mark.parametrize("step", [17, pytest.param(1, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_fault_at_any_message_leaves_all_old_or_all_new_or_off_and_restorable(
-    tmp_path: Path, fault: Callable[[FakeLink], None]
+    tmp_path: Path, fault: Callable[[FakeLink], None], step: int
 ) -> None:
     """The table of all cases: the fault comes just before message 0, 1, 2, ... of the write."""
     count = messages_of_a_clean_write(tmp_path)
     assert count > 2 * 3 * 37
     stood = {"old": 0, "new": 0, "off": 0}
-    for at in range(count):
+    cases = range(FAULTS.index(fault) % step, count, step)
+    for at in cases:
         folder = tmp_path / str(at)
         folder.mkdir()
         stood[stands_after(fault, at, folder)] += 1
-    assert sum(stood.values()) == count
+    assert sum(stood.values()) == len(cases)
 
 
 def stands_after(fault: Callable[[FakeLink], None], at: int, folder: Path) -> str:
@@ -154,6 +186,8 @@ def stands_after(fault: Callable[[FakeLink], None], at: int, folder: Path) -> st
         outcome = write(plan(current, WANTED, QUAD), link, backup=backup, clock=clock)
     except Killed:
         link.drain()
+        if link.reboots_at_the_end:
+            autopilot.reboot(clock.now, stored=False)
     autopilot.armed = False
     assert_never_half_written(autopilot)
     held = autopilot.calibration()
@@ -169,6 +203,73 @@ def stands_after(fault: Callable[[FakeLink], None], at: int, folder: Path) -> st
     for state in autopilot.states[states:]:
         assert state["COMPASS_MOTCT"] == 0 or state in (OLD, NEW)
     return "old" if held == OLD else "new" if held == NEW else "off"
+
+
+LAST = 10_000
+
+
+@pytest.mark.parametrize("at", [*range(0, 180, 30), LAST])
+@pytest.mark.parametrize("kind", [OSError, ValueError, LinkError, OutputError])
+def test_an_error_in_whoever_is_told_rolls_back_and_is_raised_again(
+    tmp_path: Path, kind: type[Exception], at: int
+) -> None:
+    autopilot = FakeAutopilot(OLD)
+    link, told = FakeLink(autopilot, VirtualClock()), 0
+
+    def fail(event: object) -> None:
+        nonlocal told
+        told += 1
+        if told > at or isinstance(event, Outcome):
+            raise kind("the terminal is gone")
+
+    with pytest.raises(kind, match="the terminal is gone") as raised:
+        upload(link, tmp_path / "b.param", on_event=fail)
+    assert told == at + 1 or at == LAST
+    assert autopilot.calibration() in (OLD, NEW)
+    journal = read_journal(tmp_path / "b.param")
+    check_claim(journal.standing, autopilot.calibration())
+    assert journal.standing in (Standing.OLD, Standing.NEW)
+    assert f"the vehicle holds {journal.standing.value}" in str(raised.value.__notes__)
+    assert_never_half_written(autopilot)
+
+
+def test_an_error_in_whoever_is_asked_to_stop_rolls_back_too(tmp_path: Path) -> None:
+    autopilot = FakeAutopilot(OLD)
+
+    def stop() -> bool:
+        if len(autopilot.writes) > 5:
+            raise RuntimeError("no screen")
+        return False
+
+    with pytest.raises(RuntimeError, match="no screen"):
+        upload(FakeLink(autopilot, VirtualClock()), tmp_path / "b.param", stop=stop)
+    assert autopilot.calibration() == OLD
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_replies_five_seconds_late_are_no_confirmation_of_what_came_later(
+    tmp_path: Path, seed: int
+) -> None:
+    autopilot, clock = FakeAutopilot(OLD), VirtualClock()
+    link = FakeLink(autopilot, clock, Network(0.05, 0.05, latency=2.5, jitter=0.1, seed=seed))
+    current = read_current(link, QUAD, WANTED, clock=clock)
+    begin = clock.now
+    outcome = write(plan(current, WANTED, QUAD), link, backup=tmp_path / "b.param", clock=clock)
+    link.drain()
+    check_claim(outcome.standing, autopilot.calibration())
+    assert clock.now - begin < 2 * Timing().limit + 10.0
+    assert_never_half_written(autopilot)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_without_timesync_only_time_proves_and_no_late_echo_does(tmp_path: Path, seed: int) -> None:
+    autopilot, clock = FakeAutopilot(OLD), VirtualClock()
+    autopilot.answers_timesync = False
+    link = FakeLink(autopilot, clock, Network(0.2, 0.1, latency=0.3, jitter=0.4, seed=seed))
+    outcome = upload(link, tmp_path / "b.param")
+    assert outcome.good
+    assert autopilot.calibration() == NEW
+    assert_never_half_written(autopilot)
 
 
 def check_claim(standing: Standing, held: dict[str, float]) -> None:

@@ -87,15 +87,17 @@ def _recording(source: str, unpacked: Unpacked, size: int) -> Recording:
     log = Log(unpacked.tables, times)
     changes = quantities.parameters(log)
     parameters = ParameterHistory(tuple(changes), _is_whole(unpacked, len(changes)))
-    who = identify(unpacked.tables, unpacked.preface, parameters.latest)
+    values = parameters.latest
+    who = identify(unpacked.tables, unpacked.preface, values)
     readings = quantities.compasses(log)
     current, voltage = quantities.batteries(log)
     attitudes = quantities.attitudes(log)
+    attitude = next(iter(attitudes), "")
     gyro, accel = quantities.inertial(log)
     duration = last_time(times)
     return Recording(
         source=source,
-        vehicle=_vehicle(who, parameters),
+        vehicle=_vehicle(who, values),
         start_unix_s=quantities.unix_start(log),
         duration_s=duration,
         field={number: each.field for number, each in readings.items()},
@@ -106,7 +108,7 @@ def _recording(source: str, unpacked: Unpacked, size: int) -> Recording:
             used=sum(map(len, unpacked.tables.values())),
             skipped=unpacked.skipped,
         ),
-        attitude=next(iter(attitudes.values()), None),
+        attitude=attitudes.get(attitude),
         gyro=gyro,
         accel=accel,
         throttle=quantities.throttle(log, who.kind),
@@ -116,8 +118,10 @@ def _recording(source: str, unpacked: Unpacked, size: int) -> Recording:
         position=quantities.position(log),
         armed=quantities.armed(log, duration),
         format="dataflash",
-        other_currents={number: series for number, series in current.items() if number},
+        other_currents={number: each for number, each in current.items() if number},
         applied=_applied(readings, parameters),
+        attitude_source=attitude,
+        other_attitudes={name: each for name, each in attitudes.items() if name != attitude},
     )
 
 
@@ -131,7 +135,7 @@ def _is_whole(unpacked: Unpacked, count: int) -> bool:
     )
 
 
-def _vehicle(who: Identity, parameters: ParameterHistory) -> Vehicle:
+def _vehicle(who: Identity, values: Mapping[str, float]) -> Vehicle:
     system, component = _ADDRESS
     return Vehicle(
         autopilot=_AUTOPILOT,
@@ -139,7 +143,7 @@ def _vehicle(who: Identity, parameters: ParameterHistory) -> Vehicle:
         system=system,
         component=component,
         firmware=who.firmware,
-        compasses=autopilots.named(_AUTOPILOT).compasses(parameters.latest),
+        compasses=autopilots.named(_AUTOPILOT).compasses(values),
         board=who.board,
         uid=who.uid,
     )

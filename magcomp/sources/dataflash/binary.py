@@ -20,7 +20,7 @@ from magcomp.sources.dataflash.table import Definition, Piece, Table, Unpacked
 
 IntArray = NDArray[np.intp]
 
-_HEAD = 0x95A3  # A3 95, little-endian
+_HEAD = (0xA3, 0x95)
 _HEAD_SIZE = 3
 _FORMAT = 128
 _FORMAT_RECORD = np.dtype(
@@ -43,13 +43,19 @@ _KINDS = re.compile(rb"[%s]{0,16}" % "".join(_TYPES).encode())
 
 
 class _Format(NamedTuple):
-    """A definition and where it stands; ``layout`` is None where it contradicts itself."""
+    """A definition and where it stands."""
 
     place: int
     number: int
     size: int
-    definition: Definition
-    layout: np.dtype[Any] | None
+    name: str
+    kinds: bytes
+    columns: bytes
+
+    @property
+    def definition(self) -> Definition:
+        columns = self.columns.partition(b"\0")[0].decode("latin-1").split(",")
+        return Definition(self.name, self.kinds.decode(), tuple(map(str.strip, columns)))
 
 
 def unpack(octets: ByteArray, wanted: Collection[str]) -> Unpacked:
@@ -68,17 +74,16 @@ def unpack(octets: ByteArray, wanted: Collection[str]) -> Unpacked:
     formats = _formats(octets, places)
     found = _Records(octets, candidates, numbers, formats)
     # A format that stands in a message's text, and not in the log's own table, describes nothing.
-    own = [each for each in formats if found.holds(each.place)]
-    if len(own) != len(formats):
-        formats = own
+    own = found.hold(np.array([each.place for each in formats], dtype=np.intp))
+    if not own.all():
+        formats = [each for each, is_own in zip(formats, own.tolist(), strict=True) if is_own]
         found = _Records(octets, candidates, numbers, formats)
     pieces: dict[str, list[Piece]] = {}
     counts: dict[str, int] = {}
     for each, rows in found.by_format():
-        name = each.definition.name
-        counts[name] = counts.get(name, 0) + len(rows)
-        if name in wanted and each.layout is not None:
-            pieces.setdefault(name, []).append(_piece(octets, each, each.layout, rows))
+        counts[each.name] = counts.get(each.name, 0) + len(rows)
+        if each.name in wanted and (piece := _piece(octets, each, rows)) is not None:
+            pieces.setdefault(each.name, []).append(piece)
     return Unpacked(
         tables={name: Table(some) for name, some in pieces.items()},
         records=len(found.place),
@@ -90,11 +95,10 @@ def unpack(octets: ByteArray, wanted: Collection[str]) -> Unpacked:
 
 def _candidates(octets: ByteArray) -> IntArray:
     """Places of A3 95, increasing."""
-    is_head = np.zeros(max(len(octets) - _HEAD_SIZE + 1, 0), dtype=bool)
-    for start in (0, 1):
-        pairs = octets[start : start + (len(octets) - start) // 2 * 2].view("<u2") == _HEAD
-        into = is_head[start::2]
-        into[:] = pairs[: len(into)]
+    if len(octets) < _HEAD_SIZE:
+        return np.zeros(0, dtype=np.intp)
+    is_head = octets[: 1 - _HEAD_SIZE] == _HEAD[0]
+    is_head &= octets[1 : 2 - _HEAD_SIZE] == _HEAD[1]
     return np.flatnonzero(is_head)
 
 
@@ -123,13 +127,8 @@ def _formats(octets: ByteArray, places: IntArray) -> list[_Format]:
         if last.get(number) == whole or not _NAME.fullmatch(name) or not _KINDS.fullmatch(kinds):
             continue
         last[number] = whole
-        if size < _HEAD_SIZE:
-            continue
-        names = tuple(
-            column.strip() for column in columns.partition(b"\0")[0].decode("latin-1").split(",")
-        )
-        definition = Definition(name.decode(), kinds.decode(), names)
-        found.append(_Format(place, number, size, definition, _layout(definition, size)))
+        if size >= _HEAD_SIZE:
+            found.append(_Format(place, number, size, name.decode(), kinds, columns))
     return found
 
 
@@ -176,10 +175,10 @@ class _Records:
         gaps = begins != ends
         self.first_gap = int(ends[np.argmax(gaps)]) if gaps.any() else len(octets)
 
-    def holds(self, place: int) -> bool:
-        """Whether a record begins at a place."""
-        at = int(np.searchsorted(self.place, place))
-        return at < len(self.place) and int(self.place[at]) == place
+    def hold(self, places: IntArray) -> NDArray[np.bool_]:
+        """Whether a record begins at each of some places."""
+        at = np.searchsorted(self.place, places)
+        return np.asarray(np.append(self.place, -1)[at] == places)
 
     def by_format(self) -> list[tuple[_Format, IntArray]]:
         """Places of the records of each format that has any."""
@@ -223,7 +222,7 @@ def _chained(begin: IntArray, end: IntArray, size: int) -> NDArray[np.bool_] | N
         return None
     if (begin[1:] == end[:-1]).all():
         return None
-    following = np.searchsorted(begin, end)
+    following = _following(begin, end)
     joins = np.append(begin, size)[following] == end
     met = np.zeros(len(begin) + 1, dtype=bool)
     met[following[joins]] = True
@@ -231,8 +230,16 @@ def _chained(begin: IntArray, end: IntArray, size: int) -> NDArray[np.bool_] | N
     chosen = np.zeros(len(begin), dtype=bool)
     if not len(sure):
         return chosen
-    chosen[sure[_reached(np.searchsorted(begin[sure], end[sure]))]] = True
+    chosen[sure[_reached(_following(begin[sure], end[sure]))]] = True
     return chosen
+
+
+def _following(begin: IntArray, end: IntArray) -> IntArray:
+    """Index of the first candidate from each one's end on, which mostly is the next one."""
+    following = np.arange(1, len(begin) + 1)
+    others = np.flatnonzero(np.append(begin[1:], -1) != end)
+    following[others] = np.searchsorted(begin, end[others])
+    return following
 
 
 def _reached(following: IntArray) -> NDArray[np.bool_]:
@@ -258,7 +265,10 @@ def _reached(following: IntArray) -> NDArray[np.bool_]:
     return np.asarray(np.cumsum(left[:-1]) == 0)
 
 
-def _piece(octets: ByteArray, of: _Format, layout: np.dtype[Any], rows: IntArray) -> Piece:
+def _piece(octets: ByteArray, of: _Format, rows: IntArray) -> Piece | None:
+    definition = of.definition
+    layout = _layout(definition, of.size)
+    if layout is None:
+        return None
     table = _records(octets, rows, of.size).view(layout)
-    columns = {name: table[name] for name in of.definition.columns if name}
-    return Piece(of.definition, rows, columns)
+    return Piece(definition, rows, {name: table[name] for name in definition.columns})

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from magcomp.model import FloatArray
 from magcomp.sources.dataflash.table import Table, Tables
@@ -21,6 +22,8 @@ _MICRO, _MILLI = "TimeUS", "TimeMS"
 _LATEST_S = 1e9
 _DISORDER_S = 1.0
 _LEAP_S = 600.0
+_FAR_S = 10.0
+_NEIGHBOURS = 4
 _ROUND_S = 0.1
 # Of old firmware: GPS.TimeMS is that of the satellites, and T the autopilot's.
 _SATELLITES, _BOARD = "GPS", "T"
@@ -115,15 +118,19 @@ def _mended(tables: Tables, stamped: Times) -> Times:
     return result
 
 
-def _strays(time: FloatArray) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+def _strays(time: FloatArray) -> NDArray[np.bool_]:
     """Which times fit to neither neighbourhood: damaged stamps, not a clock that starts again."""
-    half = 4
-    if len(time) < 2 * half + 1:
-        return np.zeros(len(time), dtype=bool)
-    padded = np.pad(time, half, mode="edge")
-    windows = np.lib.stride_tricks.sliding_window_view(padded, half)
-    before, after = np.median(windows[: len(time)], axis=1), np.median(windows[half + 1 :], axis=1)
-    far = np.minimum(np.abs(time - before), np.abs(time - after))
-    return np.asarray(far > _LEAP_S) | np.asarray(
-        (far > 10 * _DISORDER_S) & (np.abs(after - before) < _DISORDER_S)
+    stray = np.zeros(len(time), dtype=bool)
+    jumps = np.flatnonzero(np.abs(np.diff(time)) > _FAR_S)
+    if len(time) <= 2 * _NEIGHBOURS or not len(jumps):
+        return stray
+    beside = jumps[:, np.newaxis] + np.arange(1 - _NEIGHBOURS, _NEIGHBOURS + 1)
+    at = np.unique(np.clip(beside, 0, len(time) - 1))
+    windows = np.lib.stride_tricks.sliding_window_view(
+        np.pad(time, _NEIGHBOURS, mode="edge"), _NEIGHBOURS
     )
+    before = np.median(windows[at], axis=1)
+    after = np.median(windows[at + _NEIGHBOURS + 1], axis=1)
+    far = np.minimum(np.abs(time[at] - before), np.abs(time[at] - after))
+    stray[at] = (far > _LEAP_S) | ((far > _FAR_S) & (np.abs(after - before) < _DISORDER_S))
+    return stray

@@ -12,7 +12,7 @@ from magcomp.sources.dataflash.clock import Times
 from magcomp.sources.dataflash.table import Table, Tables
 
 _COLUMNS = """
-    MAG MAG2 MAG3 BAT BAT2 CURR CUR2 CTUN THR RCOU RCO2 RCO3 ESC
+    MAG MAG2 MAG3 BAT BAT2 CURR CUR2 CTUN THR RCOU RCO2 RCO3
     ATT XKF1 XKF4 XKF6 NKF1 NKF4 NKF6 AHR2 IMU GPS POS ORGN
     PARM VER MSG EV ARM STAT
 """
@@ -32,6 +32,7 @@ _FEWEST_OUTPUTS = 16
 _FIX_3D = 3
 _ARMED, _DISARMED = 10, 11
 _CENTI = 1e-2
+_MOST_OF_A_BATTERY = 1e4
 _SATELLITE_EPOCH_S = 315964800
 _SATELLITE_LEAP_S = 18
 _WEEK_S = 604800
@@ -63,31 +64,32 @@ def compasses(log: Log) -> dict[int, Readings]:
         if name not in log.tables:
             continue
         time, table = log.times[name], log.tables[name]
-        instance = table.first_of(*_INSTANCES)
-        if instance is None:
-            found[number] = _compass(time, table, np.ones(len(table), dtype=bool))
-            continue
-        which = table.numbers(instance)
-        for each in np.unique(which[np.isfinite(which)]).astype(int).tolist():
-            found[each + 1] = _compass(time, table, which == each)
-    return {
-        number: each for number, each in sorted(found.items()) if each is not None and number > 0
-    }
+        value = table.matrix("MagX", "MagY", "MagZ")
+        sound = np.isfinite(value).all(axis=1) & (value != 0).any(axis=1)
+        if "Health" in table.names:
+            sound &= table.numbers("Health") != 0
+        offset, motor = (
+            next((table.matrix(*names) for names in forms if set(names) <= table.names), None)
+            for forms in (_OFFSETS, _MOTORS)
+        )
+        for each, rows in _instances(table, number - 1):
+            kept = _in_order(time, rows & sound)
+            if len(kept):
+                found[each + 1] = Readings(
+                    Series(time[kept], value[kept]),
+                    None if offset is None else offset[kept],
+                    None if motor is None else motor[kept],
+                )
+    return {number: found[number] for number in range(1, len(_COMPASSES) + 1) if number in found}
 
 
-def _compass(time: FloatArray, table: Table, rows: NDArray[np.bool_]) -> Readings | None:
-    value = table.matrix("MagX", "MagY", "MagZ")
-    rows = rows & np.isfinite(value).all(axis=1) & (value != 0).any(axis=1)
-    if "Health" in table.names:
-        rows &= table.numbers("Health") != 0
-    kept = _in_order(time, rows)
-    if not len(kept):
-        return None
-    offset, motor = (
-        next((table.matrix(*names)[kept] for names in forms if set(names) <= table.names), None)
-        for forms in (_OFFSETS, _MOTORS)
-    )
-    return Readings(Series(time[kept], value[kept]), offset, motor)
+def _instances(table: Table, otherwise: int) -> list[tuple[int, NDArray[np.bool_]]]:
+    """Rows of each instance by its number; all rows where the message does not number them."""
+    column = table.first_of(*_INSTANCES)
+    if column is None:
+        return [(otherwise, np.ones(len(table), dtype=bool))]
+    which = table.numbers(column)
+    return [(int(each), which == each) for each in np.unique(which[np.isfinite(which)])]
 
 
 def batteries(log: Log) -> tuple[dict[int, Series], dict[int, Series]]:
@@ -99,14 +101,15 @@ def batteries(log: Log) -> tuple[dict[int, Series], dict[int, Series]]:
         if found is None:
             continue
         time, table = found
-        instance = table.first_of(*_INSTANCES)
-        which = np.full(len(table), float(number)) if instance is None else table.numbers(instance)
-        for each in np.unique(which[np.isfinite(which)]).astype(int).tolist():
-            for column, into in (("Curr", current), ("Volt", voltage)):
-                if column not in table.names or each in into:
-                    continue
-                value = table.numbers(column) * (1.0 if table.is_float(column) else _CENTI)
-                series = _series(time, value, (which == each) & np.isfinite(value))
+        instances = _instances(table, number)
+        for column, into in (("Curr", current), ("Volt", voltage)):
+            if column not in table.names:
+                continue
+            value = table.numbers(column) * (1.0 if table.is_float(column) else _CENTI)
+            # NaN fails.
+            sound = np.abs(value) < _MOST_OF_A_BATTERY
+            for each, rows in instances:
+                series = _series(time, value, rows & sound) if each not in into else None
                 if series is not None:
                     into[each] = series
     return current, voltage
@@ -151,8 +154,9 @@ def outputs(log: Log) -> Series | None:
         for channel in range(before, _MOST_OUTPUTS):
             column = found[1].first_of(*(f"{prefix}{channel + 1}" for prefix in _OUTPUT_NAMES))
             if column is not None:
-                value[:, channel] = np.nan_to_num(found[1].numbers(column)[at])
-    value[(value < 0) | (value > 1e4)] = 0
+                value[:, channel] = found[1].numbers(column)[at]
+    # NaN fails both.
+    value[~((value >= 0) & (value <= 1e4))] = 0
     driven = np.flatnonzero(value.any(axis=0))
     width = max(_FEWEST_OUTPUTS, int(driven[-1]) + 1 if len(driven) else 0)
     return Series(time[kept], value[:, :width])
@@ -265,23 +269,6 @@ def _arming(log: Log) -> tuple[FloatArray, FloatArray] | None:
             state = value[kept] == (_ARMED if name == "EV" else 1)
             return time[kept], state.astype(np.float64)
     return None
-
-
-def escs(log: Log) -> dict[int, Series]:
-    """Amperes of each speed controller by number."""
-    found = log.get("ESC")
-    instance = found[1].first_of(*_INSTANCES) if found is not None else None
-    if found is None or instance is None or "Curr" not in found[1].names:
-        return {}
-    time, table = found
-    which, value = table.numbers(instance), table.numbers("Curr")
-    value = value * (1.0 if table.is_float("Curr") else _CENTI)
-    result = {}
-    for each in np.unique(which[np.isfinite(which)]).astype(int).tolist():
-        series = _series(time, value, (which == each) & np.isfinite(value))
-        if series is not None:
-            result[each] = series
-    return result
 
 
 def parameters(log: Log) -> list[ParameterChange]:

@@ -13,6 +13,7 @@ from magcomp.model import FloatArray
 
 Columns = Mapping[str, NDArray[Any]]
 
+_PLAIN_WORDS = b"\n_ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789"
 _SCALES: Mapping[str, float] = {"c": 1e-2, "C": 1e-2, "e": 1e-2, "E": 1e-2, "L": 1e-7}
 
 
@@ -123,6 +124,9 @@ class Table:
             )
         if self._order is not None:
             found = [found[index] for index in self._order.tolist()]
+        together = b"\n".join(found)
+        if not together.translate(None, _PLAIN_WORDS) and together.count(b"\n") < len(found):
+            return together.decode("ascii").split("\n")
         return [text.partition(b"\0")[0].decode("latin-1").strip() for text in found]
 
 

@@ -1,10 +1,13 @@
-"""How fast a telemetry log is read, against pymavlink and fasttlogparser, in one run.
+"""How fast logs are read, against what else reads them, in one run.
 
-    python benchmarks/read_tlog.py [LOG...]
+    python benchmarks/read.py [LOG...]
 
-The three read the same messages of the same file, one after the other, again and again; the
-medians are compared. magcomp also verifies every frame, drops copies and builds the time axis; the
-others only decode. Then a log several times as long shows that time and memory grow with it.
+All read the same messages of the same file, one after the other, again and again; the medians are
+compared. magcomp makes a Recording of them, with parameters, time axis and quantities; the others
+only decode. Then logs several times as long show that time and memory grow with them.
+
+    .tlog   against pymavlink and, where installed, fasttlogparser
+    .BIN    against pymavlink's DFReader
 
 fasttlogparser is a C++ package that magcomp does not need. To compare with it:
     .venv/bin/pip install scikit-build-core pybind11
@@ -30,26 +33,39 @@ from pymavlink.dialects.v20.ardupilotmega import PROTOCOL_MARKER_V2, mavlink_map
 from pymavlink.generator.mavcrc import x25crc
 
 from magcomp.mavlink.messages import Message
-from magcomp.sources.tlog import read_tlog
+from magcomp.sources import read
+from magcomp.sources.dataflash.quantities import MESSAGES as DATAFLASH_MESSAGES
 
-MESSAGES = [message.name for message in Message]
+TLOG_MESSAGES = [message.name for message in Message]
 FIXTURES = Path(__file__).parents[1] / "sitl_fixtures"
-DEFAULT = [FIXTURES / "flight.tlog", FIXTURES / "turntable_five_levels.tlog"]
-GROWTH = (1, 4, 16)
+REAL = FIXTURES.parent.parent / "shared" / "real"
+DEFAULT = [
+    FIXTURES / "flight.tlog",
+    FIXTURES / "turntable_five_levels.tlog",
+    FIXTURES / "flight.BIN",
+    *REAL.glob("quad_cube_4.5.7.BIN"),
+]
+GROWTH = (1, 4, 24)
 ROUNDS = 15
 SLOW_ROUNDS = 3
 HOUR_US = 3_600_000_000
+FLIGHT_US = 300_000_000
 
 
 def with_magcomp(path: Path) -> None:
-    read_tlog(path)
+    read(path)
 
 
 def with_pymavlink(path: Path) -> None:
+    wanted = TLOG_MESSAGES if path.suffix == ".tlog" else list(DATAFLASH_MESSAGES)
     connection = mavutil.mavlink_connection(str(path))
-    while connection.recv_match(type=MESSAGES) is not None:
+    while connection.recv_match(type=wanted) is not None:
         pass
-    connection.close()
+    if path.suffix == ".tlog":
+        connection.close()
+    else:
+        connection.data_map.close()
+        connection.filehandle.close()
 
 
 def fasttlogparser_readers() -> dict[str, Callable[[Path], None]]:
@@ -62,7 +78,7 @@ def fasttlogparser_readers() -> dict[str, Callable[[Path], None]]:
         return {}
 
     def with_same_messages(path: Path) -> None:
-        parse(str(path), whitelist=MESSAGES)
+        parse(str(path), whitelist=TLOG_MESSAGES)
 
     def with_all_messages(path: Path) -> None:
         parse(str(path))
@@ -108,26 +124,28 @@ def compare(path: Path, others: dict[str, Callable[[Path], None]]) -> None:
         print(f"  {name:30s} {1e3 * median(times):9.1f} ms   {median(times) / ours:6.1f} x magcomp")
 
 
-def growth(path: Path) -> None:
+def growth(path: Path, again: Callable[[bytes, int], bytes]) -> None:
     print(f"\n{path.name}, several times as long")
     data = path.read_bytes()
     with tempfile.TemporaryDirectory() as folder:
         for times in GROWTH:
-            longer = Path(folder) / f"{times}.tlog"
-            longer.write_bytes(flown_again(data, times))
+            longer = Path(folder) / f"{times}{path.suffix}"
+            longer.write_bytes(again(data, times))
             size = longer.stat().st_size
             taken = median(seconds(with_magcomp, longer) for _ in range(ROUNDS))
             tracemalloc.start()
-            read_tlog(longer)
+            read(longer)
             peak = tracemalloc.get_traced_memory()[1]
             tracemalloc.stop()
             print(
                 f"  x {times:<3d} {size / 1e6:7.2f} MB {1e3 * taken:8.1f} ms"
                 f" {1e9 * taken / size:7.2f} ns a byte   memory at most {peak / size:.2f} x the log"
             )
+        slow = seconds(with_pymavlink, longer)
+        print(f"  x {times:<3d} by pymavlink {slow:6.1f} s   {slow / taken:6.1f} x magcomp")
 
 
-def flown_again(data: bytes, times: int) -> bytes:
+def tlog_again(data: bytes, times: int) -> bytes:
     """A clean log several times over, an hour apart, with other sequence numbers each time.
 
     With the same ones the frames would be copies, and left out.
@@ -149,12 +167,36 @@ def flown_again(data: bytes, times: int) -> bytes:
     return b"".join(rounds)
 
 
+def dataflash_again(data: bytes, times: int) -> bytes:
+    """A clean log of less than 5 min several times over, its formats and parameters once."""
+    records = []
+    kinds: dict[int, tuple[int, str, bytes]] = {128: (89, "FMT", b"")}
+    at = 0
+    while at < len(data):
+        number = data[at + 2]
+        size, name, letters = kinds[number]
+        record = data[at : at + size]
+        if name == "FMT":
+            told = record[5:9].rstrip(b"\0").decode()
+            kinds[record[3]] = (record[4], told, record[9:25].rstrip(b"\0"))
+        records.append((name, letters, record))
+        at += size
+    rounds = [data]
+    for n in range(1, times):
+        for name, letters, record in records:
+            if name not in ("FMT", "FMTU", "PARM") and letters.startswith(b"Q"):
+                (stamp,) = struct.unpack_from("<Q", record, 3)
+                rounds.append(record[:3] + struct.pack("<Q", stamp + n * FLIGHT_US) + record[11:])
+    return b"".join(rounds)
+
+
 def main() -> None:
     logs = [Path(argument) for argument in sys.argv[1:]] or DEFAULT
     others = fasttlogparser_readers()
     for path in logs:
-        compare(path, others)
-    growth(DEFAULT[0])
+        compare(path, others if path.suffix == ".tlog" else {})
+    growth(FIXTURES / "flight.tlog", tlog_again)
+    growth(FIXTURES / "flight.BIN", dataflash_again)
 
 
 if __name__ == "__main__":
