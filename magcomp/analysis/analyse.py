@@ -318,6 +318,7 @@ def _notes(
             "the log holds no parameters: the calibration in force is unknown, so only the motor "
             "vector is given, and it is right only if no motor compensation was in force"
         )
+    yield from recording.report.notes
     others = recording.report.others
     if others:
         named = ", ".join(f"{system}:{component}" for system, component in others)

@@ -54,6 +54,7 @@ def _document(recording: Recording, found: Contents) -> dict[str, Any]:
             "bad_checksum": report.bad_checksum,
             "duplicates": report.duplicates,
         },
+        "notes": list(report.notes),
         "can_be_fitted": found.can_be_fitted,
         "missing": [asdict(each) for each in found.missing],
     }
@@ -141,6 +142,8 @@ def _verdict(recording: Recording, found: Contents, columns: int) -> Iterator[st
         if compass.left_out:
             why = words.sentence(f"compass {compass.number} is left out: {compass.left_out}")
             yield from _wrapped(why, columns)
+    for note in recording.report.notes:
+        yield from _wrapped(words.sentence(note), columns)
     log = words.printable(recording.source)
     if not found.missing:
         yield f" Nothing is missing. To fit it: magcomp fit {log}"

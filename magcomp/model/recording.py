@@ -131,6 +131,8 @@ class ReadReport:
         Frames dropped because the same frame stood in the log before.
     others
         (system, component) pairs whose messages were left out.
+    notes
+        What else a user should know, a sentence each without its full stop.
     """
 
     size: int
@@ -140,6 +142,7 @@ class ReadReport:
     skipped: int = 0
     duplicates: int = 0
     others: tuple[tuple[int, int], ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 class ParameterChange(NamedTuple):

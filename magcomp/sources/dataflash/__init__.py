@@ -83,7 +83,7 @@ def _nothing(source: str, unpacked: Unpacked, size: int) -> str:
 
 
 def _recording(source: str, unpacked: Unpacked, size: int) -> Recording:
-    times, _told = time_axis(unpacked.tables)
+    times, notes = time_axis(unpacked.tables)
     log = Log(unpacked.tables, times)
     changes = quantities.parameters(log)
     parameters = ParameterHistory(tuple(changes), _is_whole(unpacked, len(changes)))
@@ -107,6 +107,7 @@ def _recording(source: str, unpacked: Unpacked, size: int) -> Recording:
             frames=unpacked.records,
             used=sum(map(len, unpacked.tables.values())),
             skipped=unpacked.skipped,
+            notes=notes,
         ),
         attitude=attitudes.get(attitude),
         gyro=gyro,
