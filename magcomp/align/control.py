@@ -17,6 +17,7 @@ from magcomp.align.sample import interpolate
 from magcomp.autopilots.protocol import MotorOutputs
 from magcomp.model import (
     CURRENT,
+    SPEED_CONTROLLERS,
     THROTTLE,
     Control,
     FloatArray,
@@ -43,9 +44,11 @@ def controls(recording: Recording) -> tuple[Control, ...]:
     motors = _motors(recording)
     duty = _duty(recording.outputs, motors)
     if recording.current is not None and _varies(recording.current):
-        found.append(Control(CURRENT, recording.current, "battery current"))
+        of_escs = recording.battery == SPEED_CONTROLLERS
+        name = "the speed controllers' current" if of_escs else "battery current"
+        found.append(Control(CURRENT, recording.current, name))
         if duty is not None:
-            found.extend(_rebuilt(recording.current, duty, CURRENT, "battery current"))
+            found.extend(_rebuilt(recording.current, duty, CURRENT, name))
     if recording.throttle is not None and _varies(recording.throttle):
         throttle = Series(recording.throttle.time, _mend_percent(recording.throttle.value))
         found.append(Control(THROTTLE, throttle, "reported throttle"))

@@ -82,6 +82,8 @@ def _lines(recording: Recording, found: Contents, columns: int) -> Iterator[str]
     board = f", {vehicle.board}" if vehicle.board else ""
     yield f" {words.duration(recording.duration_s)} of {words.vehicle(vehicle)}{board}"
     yield f" {_began(recording.start_unix_s)}, {_parameters(recording, found)}"
+    if recording.report.skipped:
+        yield f" {recording.report.skipped} bytes of {recording.report.size} belong to no message"
     if found.armed_s is not None:
         yield f" armed for {words.duration(found.armed_s)}"
     if found.compasses:

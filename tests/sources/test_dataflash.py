@@ -149,6 +149,22 @@ def test_an_unhealthy_reading_is_no_reading(tmp_path: Path) -> None:
     assert len(from_bytes(tmp_path, log.binary()).field[1]) == 15
 
 
+@pytest.mark.parametrize("numbered", [True, False])
+def test_the_speed_controllers_currents_are_summed(tmp_path: Path, numbered: bool) -> None:
+    if numbered:
+        forms = [Form(101, "ESC", "QBf", "TimeUS,Instance,Curr")] * 2
+    else:
+        forms = [Form(101 + n, f"ESC{n + 1}", "QH", "TimeUS,Curr") for n in range(2)]
+    log = Writer(forms=(FMT, *{form.name: form for form in forms}.values()))
+    for k in range(20):
+        for n, form in enumerate(forms):
+            amperes = 2.0 + n + k
+            log.add(form, 1000 * k, *((n, amperes) if numbered else (100 * amperes,)))
+    found = from_bytes(tmp_path, log.binary())
+    np.testing.assert_allclose(found.esc_current.value, 5.0 + 2.0 * np.arange(20))
+    assert found.current is None
+
+
 def test_a_number_that_no_compass_or_battery_has_is_damage(tmp_path: Path) -> None:
     log = short_flight(1.0)
     log.add(MAG, 9_000_000, 163, 200, 1, 400, 12, -8, 0, 3, 0, -2, 1, 0)
