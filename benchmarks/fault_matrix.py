@@ -1,8 +1,8 @@
 """What stands on a vehicle after a write that went wrong: every message × every fault.
 
-A simulated vehicle with two memories (what is in force; what a reboot brings back, into which writes
-go late and in any order) is written by the client that writes real ones. At each message of the
-write in turn, or each STEP-th, one thing goes wrong. Counted are:
+A simulated vehicle with two memories (what is in force; what a reboot brings back, into which
+writes go late and in any order) is written by the client that writes real ones. At each message of
+the write in turn, or each STEP-th, one thing goes wrong. Counted are:
 
 half-written
     Some instant at which compensation was on with values that are neither all old nor all new.
@@ -16,13 +16,15 @@ not restored
 
 from __future__ import annotations
 
-import os
+import contextlib
 import sys
 import tempfile
 import time
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 from magcomp.link.identity import read_heartbeat
 from magcomp.mavlink.version import unique_id
@@ -75,10 +77,12 @@ class Watched:
         self.states: list[Held] = []
 
     def receive(self, frame: bytes, time: float) -> None:
+        """See magcomp.simulate.Machine."""
         self._machine.receive(frame, time)
         self._look()
 
     def advance(self, time: float) -> list[Frame]:
+        """See magcomp.simulate.Machine."""
         frames: list[Frame] = self._machine.advance(time)
         self._look()
         return frames
@@ -118,12 +122,10 @@ class Case:
         connection = LocalConnection(self.watched, calm.clock())
         messages = _Counter(connection, at if kind == "killed" else 0)
         told = _Teller(at if kind == "callback" else 0)
-        try:
+        with contextlib.suppress(KilledError, CallbackError):
             self.outcome = writer.write(
                 self.plan, messages, backup=self.backup, clock=connection.clock, on_event=told
             )
-        except (KilledError, CallbackError):
-            pass
         self.counted, self.told = link.counted, told.count
         self.seconds = connection.clock() - calm.clock()
         if kind == "killed":
@@ -195,7 +197,7 @@ class _Teller:
     def __init__(self, at: int) -> None:
         self._at, self.count = at, 0
 
-    def __call__(self, event: object) -> None:
+    def __call__(self, _: object) -> None:
         self.count += 1
         if self.count == self._at:
             raise CallbackError
@@ -204,8 +206,8 @@ class _Teller:
 KINDS: dict[str, Callable[[int], tuple[Faults, str]]] = {
     "link dies": lambda at: (Faults(dead_at=at), ""),
     "vehicle reboots": lambda at: (Faults(reboot_at=at), ""),
-    "killed, then reboots": lambda at: (Faults(), "killed"),
-    "exception in a callback": lambda at: (Faults(), "callback"),
+    "killed, then reboots": lambda _: (Faults(), "killed"),
+    "exception in a callback": lambda _: (Faults(), "callback"),
     "stranger confirms, link dies": lambda at: (Faults(dead_at=at, stranger=(1, 154)), ""),
     "another arms it": lambda at: (Faults(arm_at=at), ""),
 }
@@ -213,7 +215,11 @@ KINDS: dict[str, Callable[[int], tuple[Faults, str]]] = {
 
 def main() -> None:
     step = int(sys.argv[1]) if len(sys.argv) > 1 else 10
-    os.fsync = lambda _: None  # the disk is not what is measured
+    with mock.patch("os.fsync"):  # the disk is not what is measured
+        measure(step)
+
+
+def measure(step: int) -> None:
     with tempfile.TemporaryDirectory() as name:
         clean = Case(Faults(), Path(name))
     print(f"ArduPilot: {clean.counted} messages, {clean.told} events, {clean.seconds:.1f} s clean")
@@ -222,7 +228,8 @@ def main() -> None:
         f"{'old/new/off':>16}{'longest':>9}"
     )
     for kind, made in KINDS.items():
-        begun, counts, stood, longest = time.monotonic(), [0, 0, 0], {}, 0.0
+        begun, counts, longest = time.monotonic(), [0, 0, 0], 0.0
+        stood: Counter[str] = Counter()
         last = clean.told if kind == "exception in a callback" else clean.counted
         cases = range(1, last + 1, step)
         for at in cases:
@@ -231,9 +238,9 @@ def main() -> None:
                 case = Case(faults, Path(name), at, how)
                 *bad, word = case.verdict()
             counts = [count + one for count, one in zip(counts, bad, strict=True)]
-            stood[word] = stood.get(word, 0) + 1
+            stood[word] += 1
             longest = max(longest, case.seconds)
-        shares = "/".join(str(stood.get(word, 0)) for word in ("old", "new", "off"))
+        shares = "/".join(str(stood[word]) for word in ("old", "new", "off"))
         print(
             f"{kind:<32}{len(cases):>6}{counts[0]:>14}{counts[1]:>14}{counts[2]:>14}"
             f"{shares:>16}{longest:>7.0f} s   ({time.monotonic() - begun:.0f} s of work)",
