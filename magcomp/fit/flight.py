@@ -19,7 +19,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import lfilter
 
 from magcomp.align import sample, within
 from magcomp.earth import EarthField
@@ -336,6 +335,9 @@ def _leaning(samples: Samples) -> FloatArray:
     A multirotor accelerates where it leans, and its attitude filter takes the acceleration for
     gravity within a few seconds.
     """
+    # SciPy's filters cost a second to import: only where there is something to fit.
+    from scipy.signal import lfilter  # noqa: PLC0415
+
     if len(samples) < 2:
         return np.zeros((len(samples), 2))
     step = max(float(np.median(np.diff(samples.time))), 1e-3)

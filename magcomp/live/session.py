@@ -8,14 +8,11 @@ A terminal interface draws ``snapshot()`` and calls the rest.
 from __future__ import annotations
 
 import contextlib
-import math
 import threading
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Self
-
-import numpy as np
 
 from magcomp.analysis.analyse import Options, Progress, analyse
 from magcomp.buffer import Buffer
@@ -24,36 +21,20 @@ from magcomp.link import (
     DEFAULT_RATES,
     Connection,
     FrameSink,
-    GapEnded,
-    GapStarted,
-    LinkEvent,
     Recorder,
-    Replay,
-    VehicleFound,
-    VehicleRebooted,
     connect,
 )
 from magcomp.link.clock import Clock, SystemClock
-from magcomp.live.guide import (
-    Guidance,
-    SituationWatch,
-    View,
-    guide,
-    level_seconds,
-    levels_done,
-)
-from magcomp.live.latest import Latest, Now
+from magcomp.live.latest import Latest
 from magcomp.live.prepare import Preparation
 from magcomp.live.refit import DEFAULT_SHARE, Refit, Refitter
-from magcomp.live.snapshot import LiveSnapshot, compasses_now, warnings
+from magcomp.live.snapshot import LiveSnapshot
 from magcomp.live.tap import Tap
 from magcomp.live.upload import finish_restore, make_plan, read_backup, wait_disarmed, write_plan
-from magcomp.model import Analysis, Grade, ParameterSet, Recording, Vehicle
+from magcomp.live.watch import LOOK_S, Watch
+from magcomp.model import Analysis, ParameterSet, Recording, Vehicle
 from magcomp.writing.events import Event, Outcome
 from magcomp.writing.plan import WritePlan
-
-_LOOK_S = 0.2
-_NOTHING = Now(0, None, {}, (), None, None, None, None, None, None, False)
 
 
 def _silent(_: object) -> None:
@@ -99,17 +80,18 @@ class LiveSession:
         self.connection = connection
         self._tap = tap
         self._clock = clock
-        self._opened = clock.monotonic()
         self._asked = threading.Lock()
         self._preparation = Preparation(connection, rates, clock)
         self._stop = threading.Event()
-        self._situation = SituationWatch()
-        self._notes: list[str] = []
         self._refits = (options, refit_share)
         self._refitter: Refitter | None = None
+        self._watch = Watch(connection, tap, self._preparation, clock, lambda: self.refit)
         self._threads = [
             threading.Thread(target=work, name=f"magcomp-{name}", daemon=True)
-            for name, work in (("prepare", self._prepare), ("watch", self._watch))
+            for name, work in (
+                ("prepare", self._prepare),
+                ("watch", lambda: self._watch.run(self._stop)),
+            )
         ]
         for thread in self._threads:
             thread.start()
@@ -208,7 +190,7 @@ class LiveSession:
             Several vehicles and none chosen, or the link is lost for good.
         """
         vehicle = self.connection.wait_vehicle(timeout)
-        while not self._preparation.over.wait(_LOOK_S):
+        while not self._preparation.over.wait(LOOK_S):
             if self._stop.is_set():
                 raise LinkError(f"The connection to {self.connection.address} is closed.")
         if self._preparation.failure is not None:
@@ -219,43 +201,7 @@ class LiveSession:
 
     def snapshot(self) -> LiveSnapshot:
         """Everything a screen shows, now. Costs well under a millisecond."""
-        vehicle = self.connection.vehicle
-        latest = self._tap.latest
-        now = _NOTHING if vehicle is None else latest.now(vehicle)
-        parameters = {} if vehicle is None else latest.parameters(vehicle)
-        link, refit = self.connection.statistics(), self.refit
-        view = self._view(now)
-        return LiveSnapshot(
-            address=str(self.connection.address),
-            vehicle=vehicle,
-            connected=link.up,
-            link_text=self._link_text(vehicle, link.up),
-            armed=now.armed,
-            elapsed_s=self.elapsed_s,
-            recording_path=self._tap.path,
-            recording_bytes=self._tap.size,
-            recording=self._tap.taking and not self._tap.failure,
-            recording_trouble=self._tap.failure,
-            link=link,
-            compasses=compasses_now(now, vehicle, parameters, refit),
-            throttle=now.throttle,
-            current=now.current,
-            voltage=now.voltage,
-            attitude_deg=_degrees(now),
-            height_m=now.height_m,
-            coverage=view.coverage,
-            levels_done=levels_done(view.coverage),
-            level_seconds=level_seconds(view),
-            situation=view.situation,
-            guidance=self._guidance(vehicle, view),
-            warnings=self._warnings(now, vehicle, parameters),
-            analysis=refit.analysis,
-            grade=view.grade,
-            stable_refits=refit.stable,
-            fit_trouble=refit.trouble,
-            ready=self._preparation.over.is_set(),
-            ended=self.connection.ended,
-        )
+        return self._watch.snapshot()
 
     @property
     def vehicle(self) -> Vehicle | None:
@@ -275,9 +221,7 @@ class LiveSession:
     @property
     def elapsed_s(self) -> float:
         """Seconds since the session was opened; of the log, where one is replayed."""
-        if isinstance(self.connection.address, Replay):
-            return self._tap.latest.span_s
-        return self._clock.monotonic() - self._opened
+        return self._watch.elapsed_s
 
     @property
     def armed(self) -> bool | None:
@@ -412,33 +356,6 @@ class LiveSession:
         if share and not self._stop.is_set():
             self._refitter = Refitter(self.recording, options, share=share)
 
-    def _watch(self) -> None:
-        while not self._stop.wait(_LOOK_S):
-            for event in self.connection.take_events():
-                self._take(event)
-            vehicle = self.connection.vehicle
-            if vehicle is None:
-                continue
-            now = self._tap.latest.now(vehicle)
-            # By the vehicle's clock: a replay, or a simulation, may be faster than ours.
-            self._situation.update(
-                self._tap.seconds, now.armed, now.attitude, now.height_m, now.speed
-            )
-
-    def _take(self, event: LinkEvent) -> None:
-        match event:
-            case GapStarted():
-                self._note("the link was lost")
-            case GapEnded(duration=duration):
-                self._note(f"the link was gone for {duration:.0f} s")
-            case VehicleRebooted():
-                self._note("the vehicle rebooted")
-            case VehicleFound():
-                self._preparation.trouble = ""
-
-    def _note(self, text: str) -> None:
-        self._notes = [*self._notes[-4:], text]
-
     # ---------------------------------------------------------------- inside
 
     def _known_vehicle(self) -> Vehicle:
@@ -446,64 +363,3 @@ class LiveSession:
         if vehicle is None:
             raise LinkTimeoutError(f"No vehicle is on {self.connection.address}.")
         return vehicle
-
-    def _view(self, now: Now) -> View:
-        refit = self.refit
-        return View(
-            situation=self._situation.situation,
-            armed=now.armed,
-            throttle=now.throttle,
-            attitude=now.attitude,
-            height_m=now.height_m,
-            coverage=self._tap.buffer.coverage(),
-            seconds=self._tap.seconds,
-            grade=None if refit.analysis is None else refit.analysis.grade,
-            stable_refits=refit.stable,
-            bound_deg=_bound_deg(refit.analysis),
-        )
-
-    def _guidance(self, vehicle: Vehicle | None, view: View) -> Guidance:
-        if vehicle is None:
-            return Guidance("waiting for the vehicle's heartbeat", 0.0)
-        if not self._preparation.over.is_set():
-            return Guidance("reading the vehicle's calibration", 0.0)
-        return guide(view)
-
-    def _link_text(self, vehicle: Vehicle | None, up: bool) -> str:
-        if vehicle is None:
-            return self._preparation.trouble or "waiting for a heartbeat"
-        if not up:
-            return "the link is lost; trying again"
-        return self._preparation.trouble or "connected"
-
-    def _warnings(
-        self, now: Now, vehicle: Vehicle | None, parameters: Mapping[str, float]
-    ) -> tuple[str, ...]:
-        if vehicle is None:
-            return ()
-        since = self._preparation.streaming_since
-        streaming = 0.0 if since is None else self._clock.monotonic() - since
-        found = [*warnings(now, vehicle, parameters, streaming), *reversed(self._notes)]
-        if self._preparation.failure is not None:
-            found.insert(0, str(self._preparation.failure).rstrip("."))
-        if self._tap.failure:
-            found.insert(0, self._tap.failure.rstrip("."))
-        return tuple(found)
-
-
-def _bound_deg(analysis: Analysis | None) -> float:
-    """Largest heading error, 95 %, of the compasses that are not rejected."""
-    errors = [
-        error.p95
-        for result in (analysis.compasses if analysis else ())
-        if result.verdict.grade is not Grade.REJECTED
-        for error in result.verdict.heading_error
-    ]
-    return max(errors, default=math.inf)
-
-
-def _degrees(now: Now) -> tuple[float, float, float] | None:
-    if now.attitude is None:
-        return None
-    roll, pitch, yaw = np.degrees(now.attitude).tolist()
-    return roll, pitch, yaw % 360.0

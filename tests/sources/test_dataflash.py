@@ -145,6 +145,15 @@ def test_an_unhealthy_reading_is_no_reading(tmp_path: Path) -> None:
     assert len(from_bytes(tmp_path, log.binary()).field[1]) == 15
 
 
+def test_a_number_that_no_compass_or_battery_has_is_damage(tmp_path: Path) -> None:
+    log = short_flight(1.0)
+    log.add(MAG, 9_000_000, 163, 200, 1, 400, 12, -8, 0, 3, 0, -2, 1, 0)
+    log.add(BAT, 9_000_000, 0, 1e30, -1e30)
+    found = from_bytes(tmp_path, log.binary())
+    assert sorted(found.field) == sorted(found.applied) == [1, 2]
+    assert found.current.value.min() == 10.0
+
+
 # ---------------------------------------------------------------- damage
 
 

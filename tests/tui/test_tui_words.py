@@ -32,6 +32,11 @@ def test_importing_the_command_line_does_not_import_textual():
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
+def test_the_first_screen_does_not_wait_for_what_only_a_fit_needs():
+    code = "import sys, magcomp.tui; sys.exit('scipy' in sys.modules or 'plotly' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
 def test_without_a_terminal_the_command_says_what_to_use():
     command = [sys.executable, "-m", "magcomp", "tui"]
     ended = subprocess.run(

@@ -32,6 +32,7 @@ _FEWEST_OUTPUTS = 16
 _FIX_3D = 3
 _ARMED, _DISARMED = 10, 11
 _CENTI = 1e-2
+_MOST_OF_A_BATTERY = 1e4
 _SATELLITE_EPOCH_S = 315964800
 _SATELLITE_LEAP_S = 18
 _WEEK_S = 604800
@@ -79,7 +80,7 @@ def compasses(log: Log) -> dict[int, Readings]:
                     None if offset is None else offset[kept],
                     None if motor is None else motor[kept],
                 )
-    return {number: each for number, each in sorted(found.items()) if number > 0}
+    return {number: found[number] for number in range(1, len(_COMPASSES) + 1) if number in found}
 
 
 def _instances(table: Table, otherwise: int) -> list[tuple[int, NDArray[np.bool_]]]:
@@ -105,7 +106,8 @@ def batteries(log: Log) -> tuple[dict[int, Series], dict[int, Series]]:
             if column not in table.names:
                 continue
             value = table.numbers(column) * (1.0 if table.is_float(column) else _CENTI)
-            sound = np.isfinite(value)
+            # NaN fails.
+            sound = np.abs(value) < _MOST_OF_A_BATTERY
             for each, rows in instances:
                 series = _series(time, value, rows & sound) if each not in into else None
                 if series is not None:

@@ -1,0 +1,204 @@
+"""Watches a live link: what happens on it, how the vehicle is moved, and what a screen shows."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from magcomp.link import (
+    Connection,
+    GapEnded,
+    GapStarted,
+    LinkEvent,
+    Replay,
+    VehicleFound,
+    VehicleRebooted,
+)
+from magcomp.link.clock import Clock
+from magcomp.live.guide import (
+    Guidance,
+    SituationWatch,
+    View,
+    guide,
+    level_seconds,
+    levels_done,
+)
+from magcomp.live.latest import Now
+from magcomp.live.prepare import Preparation
+from magcomp.live.refit import Refit
+from magcomp.live.snapshot import LiveSnapshot, compasses_now, warnings
+from magcomp.live.tap import Tap
+from magcomp.model import Analysis, Grade, Vehicle
+
+LOOK_S = 0.2
+_NOTHING = Now(0, None, {}, (), None, None, None, None, None, None, False)
+
+
+class Watch:
+    """Looks at a link a few times a second, in the thread that calls ``run``.
+
+    Parameters
+    ----------
+    connection, tap, preparation
+        What is watched.
+    clock
+        The computer's clocks.
+    refit
+        How the fitting stands.
+    """
+
+    def __init__(
+        self,
+        connection: Connection,
+        tap: Tap,
+        preparation: Preparation,
+        clock: Clock,
+        refit: Callable[[], Refit],
+    ) -> None:
+        self._connection = connection
+        self._tap = tap
+        self._preparation = preparation
+        self._clock = clock
+        self._refit = refit
+        self._opened = clock.monotonic()
+        self._situation = SituationWatch()
+        self._notes: list[str] = []
+
+    def run(self, stop: threading.Event) -> None:
+        """Watch until stopped."""
+        while not stop.wait(LOOK_S):
+            for event in self._connection.take_events():
+                self._take(event)
+            vehicle = self._connection.vehicle
+            if vehicle is None:
+                continue
+            now = self._tap.latest.now(vehicle)
+            # By the vehicle's clock: a replay, or a simulation, may be faster than ours.
+            self._situation.update(
+                self._tap.seconds, now.armed, now.attitude, now.height_m, now.speed
+            )
+
+    @property
+    def elapsed_s(self) -> float:
+        """Seconds since the session was opened; of the log, where one is replayed."""
+        if isinstance(self._connection.address, Replay):
+            return self._tap.latest.span_s
+        return self._clock.monotonic() - self._opened
+
+    def snapshot(self) -> LiveSnapshot:
+        """Everything a screen shows, now. Costs well under a millisecond."""
+        vehicle = self._connection.vehicle
+        latest = self._tap.latest
+        now = _NOTHING if vehicle is None else latest.now(vehicle)
+        parameters = {} if vehicle is None else latest.parameters(vehicle)
+        link, refit = self._connection.statistics(), self._refit()
+        view = self._view(now)
+        return LiveSnapshot(
+            address=str(self._connection.address),
+            vehicle=vehicle,
+            connected=link.up,
+            link_text=self._link_text(vehicle, link.up),
+            armed=now.armed,
+            elapsed_s=self.elapsed_s,
+            recording_path=self._tap.path,
+            recording_bytes=self._tap.size,
+            recording=self._tap.taking and not self._tap.failure,
+            recording_trouble=self._tap.failure,
+            link=link,
+            compasses=compasses_now(now, vehicle, parameters, refit),
+            throttle=now.throttle,
+            current=now.current,
+            voltage=now.voltage,
+            attitude_deg=_degrees(now),
+            height_m=now.height_m,
+            coverage=view.coverage,
+            levels_done=levels_done(view.coverage),
+            level_seconds=level_seconds(view),
+            situation=view.situation,
+            guidance=self._guidance(vehicle, view),
+            warnings=self._warnings(now, vehicle, parameters),
+            analysis=refit.analysis,
+            grade=view.grade,
+            stable_refits=refit.stable,
+            fit_trouble=refit.trouble,
+            ready=self._preparation.over.is_set(),
+            ended=self._connection.ended,
+        )
+
+    def _take(self, event: LinkEvent) -> None:
+        match event:
+            case GapStarted():
+                self._note("the link was lost")
+            case GapEnded(duration=duration):
+                self._note(f"the link was gone for {duration:.0f} s")
+            case VehicleRebooted():
+                self._note("the vehicle rebooted")
+            case VehicleFound():
+                self._preparation.trouble = ""
+
+    def _note(self, text: str) -> None:
+        self._notes = [*self._notes[-4:], text]
+
+    def _view(self, now: Now) -> View:
+        refit = self._refit()
+        return View(
+            situation=self._situation.situation,
+            armed=now.armed,
+            throttle=now.throttle,
+            attitude=now.attitude,
+            height_m=now.height_m,
+            coverage=self._tap.buffer.coverage(),
+            seconds=self._tap.seconds,
+            grade=None if refit.analysis is None else refit.analysis.grade,
+            stable_refits=refit.stable,
+            bound_deg=_bound_deg(refit.analysis),
+        )
+
+    def _guidance(self, vehicle: Vehicle | None, view: View) -> Guidance:
+        if vehicle is None:
+            return Guidance("waiting for the vehicle's heartbeat", 0.0)
+        if not self._preparation.over.is_set():
+            return Guidance("reading the vehicle's calibration", 0.0)
+        return guide(view)
+
+    def _link_text(self, vehicle: Vehicle | None, up: bool) -> str:
+        if vehicle is None:
+            return self._preparation.trouble or "waiting for a heartbeat"
+        if not up:
+            return "the link is lost; trying again"
+        return self._preparation.trouble or "connected"
+
+    def _warnings(
+        self, now: Now, vehicle: Vehicle | None, parameters: Mapping[str, float]
+    ) -> tuple[str, ...]:
+        if vehicle is None:
+            return ()
+        since = self._preparation.streaming_since
+        streaming = 0.0 if since is None else self._clock.monotonic() - since
+        found = [*warnings(now, vehicle, parameters, streaming), *reversed(self._notes)]
+        if self._preparation.failure is not None:
+            found.insert(0, str(self._preparation.failure).rstrip("."))
+        if self._tap.failure:
+            found.insert(0, self._tap.failure.rstrip("."))
+        return tuple(found)
+
+
+def _bound_deg(analysis: Analysis | None) -> float:
+    """Largest heading error, 95 %, of the compasses that are not rejected."""
+    errors = [
+        error.p95
+        for result in (analysis.compasses if analysis else ())
+        if result.verdict.grade is not Grade.REJECTED
+        for error in result.verdict.heading_error
+    ]
+    return max(errors, default=math.inf)
+
+
+def _degrees(now: Now) -> tuple[float, float, float] | None:
+    if now.attitude is None:
+        return None
+    roll, pitch, yaw = np.degrees(now.attitude).tolist()
+    return roll, pitch, yaw % 360.0
