@@ -18,6 +18,7 @@ from magcomp.align.sample import interpolate
 from magcomp.autopilots.protocol import MotorOutputs
 from magcomp.model import (
     CURRENT,
+    SPEED_CONTROLLERS,
     THROTTLE,
     Control,
     FloatArray,
@@ -51,10 +52,12 @@ def controls(recording: Recording) -> tuple[Control, ...]:
     motors = _motors(recording)
     duty = _duty(recording.outputs, motors)
     if recording.current is not None and _varies(recording.current):
-        found.append(Control(CURRENT, recording.current, "battery current"))
+        of_escs = recording.battery == SPEED_CONTROLLERS
+        name = "the speed controllers' current" if of_escs else "battery current"
+        found.append(Control(CURRENT, recording.current, name))
         for features, source in _finer(recording, duty):
-            name = f"battery current, rebuilt from the {source}"
-            found.extend(_rebuilt(recording.current, features, CURRENT, name))
+            whole = f"{name}, rebuilt from the {source}"
+            found.extend(_rebuilt(recording.current, features, CURRENT, whole))
     if recording.throttle is not None and _varies(recording.throttle):
         throttle = Series(recording.throttle.time, _mend_percent(recording.throttle.value))
         found.append(Control(THROTTLE, throttle, "reported throttle"))

@@ -10,6 +10,7 @@ import numpy as np
 from magcomp import autopilots
 from magcomp.align import controls, expected_earth, has_position, readings, reported
 from magcomp.align.health import compass_complaints, current_complaints
+from magcomp.analysis.choose import with_speed_controllers
 from magcomp.analysis.emit import Emission, emit
 from magcomp.analysis.multiplied import kinds_to_try, multiplied_notes, why_only_to_look_at
 from magcomp.analysis.vehicle_words import in_words_of
@@ -29,7 +30,8 @@ from magcomp.model import (
     Verdict,
 )
 
-REGRESSORS = ("auto", CURRENT, THROTTLE, "motors")
+ESC = "esc"
+REGRESSORS = ("auto", CURRENT, THROTTLE, "motors", ESC)
 
 BETTER = 0.97
 """Throttle is written instead of current only where it leaves less than this share unexplained:
@@ -106,6 +108,9 @@ def analyse(
         Where every compass asked for has a parameter that is not finite.
     """
     wanted = Options() if options is None else options
+    if wanted.regressor == ESC:
+        recording = with_speed_controllers(recording)
+        wanted = replace(wanted, regressor=CURRENT)
     compasses = _compasses(recording, wanted)
     found = _controls_of(recording)
     kinds = _kinds(recording, found, wanted)
@@ -341,6 +346,7 @@ def _notes(
             "the log holds no parameters: the calibration in force is unknown, so only the motor "
             "vector is given, and it is right only if no motor compensation was in force"
         )
+    yield from recording.report.notes
     others = recording.report.others
     if others:
         named = ", ".join(f"{system}:{component}" for system, component in others)
