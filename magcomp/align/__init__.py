@@ -3,13 +3,14 @@
 from magcomp.align.control import controls, reported
 from magcomp.align.expected import expected_earth, has_position
 from magcomp.align.readings import readings, within
-from magcomp.align.sample import interpolate, sample
+from magcomp.align.sample import interpolate, low_pass, sample
 
 __all__ = [
     "controls",
     "expected_earth",
     "has_position",
     "interpolate",
+    "low_pass",
     "readings",
     "reported",
     "sample",

@@ -11,10 +11,9 @@ does not bias a slope the way an error of interpolation does.
 from __future__ import annotations
 
 import numpy as np
-from scipy.signal import lfilter
 
 from magcomp import autopilots
-from magcomp.align.sample import interpolate
+from magcomp.align.sample import interpolate, low_pass
 from magcomp.autopilots.protocol import MotorOutputs
 from magcomp.model import (
     CURRENT,
@@ -199,8 +198,7 @@ def _smoothed(series: Series, constant: float) -> Series:
     time = np.arange(series.time[0], series.time[-1] + step, step)
     even = interpolate(series, time)
     share = 1.0 - float(np.exp(-step / constant))
-    start = (1.0 - share) * even[:1]
-    smooth, _ = lfilter([share], [1.0, share - 1.0], even, axis=0, zi=start)
+    smooth = low_pass(even, share, even[0])
     return Series(series.time, interpolate(Series(time, smooth), series.time))
 
 

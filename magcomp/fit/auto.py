@@ -14,8 +14,10 @@ from magcomp.fit.flight import (
     REGRESSOR_LAG,
     SIZE,
     STRENGTH,
+    FlightEstimate,
     Problem,
     correction_of,
+    errors_of,
     estimate,
     estimate_lags,
     is_calibrated,
@@ -128,7 +130,14 @@ def refit(problem: Problem, fit: MotorFit, keep: BoolArray) -> MotorFit:
             np.zeros(SIZE - CORRECTION_SIZE - 4),
         ]
     )
-    found = estimate(part, _groups(fit), start=start, hold_lags=True, with_covariance=False)
+    found = estimate(
+        part,
+        _groups(fit),
+        start=start,
+        hold_lags=True,
+        errors=errors_of(part.sample(lags_of(start)), start),
+        with_covariance=False,
+    )
     return _updated(fit, found)
 
 
@@ -170,7 +179,7 @@ def fit_flight(problem: Problem) -> MotorFit:
     return with_line(bare, centres)
 
 
-def _choose_freedom(problem: Problem) -> tuple[Estimate, int]:
+def _choose_freedom(problem: Problem) -> tuple[FlightEstimate, int]:
     """The least open fit that explains the field nearly as well as the most open admissible one.
 
     Admissible is what the data determine: see :func:`is_determined`. Candidates are compared at
@@ -186,6 +195,7 @@ def _choose_freedom(problem: Problem) -> tuple[Estimate, int]:
             free,
             start=opened.parameters,
             hold_lags=True,
+            errors=opened.errors,
             with_covariance=False,
             rounds=_QUICK,
         )
@@ -195,11 +205,11 @@ def _choose_freedom(problem: Problem) -> tuple[Estimate, int]:
             and ratio < CLEAR
             and not _pays_on_unseen(problem, (tried, free), (opened, most))
         ):
-            return estimate(problem, free, start=tried.parameters), free
+            return estimate(problem, free, start=tried.parameters, errors=opened.errors), free
     return opened, most
 
 
-def _most_open(problem: Problem) -> tuple[int, Estimate]:
+def _most_open(problem: Problem) -> tuple[int, FlightEstimate]:
     """The most open fit whose parameters the data determine.
 
     With motors alone where they determine no more, unless the data contradict the calibration in
@@ -235,7 +245,7 @@ def _typical(noise: FloatArray) -> float:
 
 
 def _pays_on_unseen(
-    problem: Problem, closed: tuple[Estimate, int], opened: tuple[Estimate, int]
+    problem: Problem, closed: tuple[FlightEstimate, int], opened: tuple[FlightEstimate, int]
 ) -> bool:
     """Whether the open fit also predicts held-out readings better."""
     fold = folds(problem.readings.time)
@@ -249,6 +259,7 @@ def _pays_on_unseen(
                 free,
                 start=found.parameters,
                 hold_lags=True,
+                errors=found.errors,
                 with_covariance=False,
             )
             unseen = problem.where(fold == index).sample(lags)

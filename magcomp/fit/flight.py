@@ -20,8 +20,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from magcomp.align import sample, within
+from magcomp.align import low_pass, sample, within
 from magcomp.earth import EarthField
+from magcomp.fit.control_noise import Noise, noise_of, whitened
 from magcomp.fit.robust import ROUNDS, Estimate, Prior, solve, time_blocks
 from magcomp.model import (
     CORRECTION_SIZE,
@@ -156,16 +157,29 @@ def prior(problem: Problem, free: int) -> Prior:
     return Prior(mean, width)
 
 
+@dataclass(frozen=True, eq=False)
+class FlightEstimate(Estimate):
+    """An estimate and the sizes of the errors it was made with.
+
+    Attributes
+    ----------
+    errors
+        None where those of the control quantity do not show.
+    """
+
+    errors: Noise | None = None
+
+
 def estimate(
     problem: Problem,
     free: int,
     *,
     start: FloatArray | None = None,
     hold_lags: bool = False,
-    noise: FloatArray | None = None,
+    errors: Noise | None = None,
     with_covariance: bool = True,
     rounds: int = ROUNDS,
-) -> Estimate:
+) -> FlightEstimate:
     """Fit one compass with the first ``free`` groups of :data:`GROUPS` open.
 
     Parameters
@@ -178,8 +192,9 @@ def estimate(
         Parameters to begin at, shape (16,); the prior's mean by default.
     hold_lags
         Keep the lags of ``start``.
-    noise
-        Spread of both residuals, mGauss, shape (2,), where known.
+    errors
+        Sizes of the errors where known; found in the residuals otherwise, unless the estimate is
+        one without covariance, which then takes the control quantity as exact.
     with_covariance
         False inside a search.
     rounds
@@ -194,22 +209,33 @@ def estimate(
     if hold_lags and start is not None:
         begin[[FIELD_LAG, REGRESSOR_LAG]] = start[[FIELD_LAG, REGRESSOR_LAG]]
     fixed = problem.sample(lags_of(begin)) if hold_lags else None
+    search = with_covariance and errors is None
 
-    def residuals(parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
-        rows = problem.sample(lags_of(parameters)) if fixed is None else fixed
-        return strength_and_dip(rows, parameters)
+    def rows_at(parameters: FloatArray) -> Samples:
+        return problem.sample(lags_of(parameters)) if fixed is None else fixed
 
-    blocks = drift_blocks(problem.readings.time) if with_covariance else None
-    return solve(
-        residuals,
-        begin,
-        known,
-        blocks=blocks,
-        doubt=_doubt(known),
-        noise=noise,
-        rounds=rounds,
-        feasible=is_physical,
-    )
+    def solved(begin: FloatArray, noise: Noise | None, *, last: bool) -> Estimate:
+        return solve(
+            lambda p: strength_and_dip(rows_at(p), p, noise),
+            begin,
+            known,
+            blocks=drift_blocks(problem.readings.time) if with_covariance and last else None,
+            doubt=_doubt(known),
+            rounds=rounds,
+            feasible=is_physical,
+        )
+
+    found = solved(begin, errors, last=not search)
+    if search:
+        errors = errors_of(rows_at(found.parameters), found.parameters)
+        found = solved(found.parameters, errors, last=True)
+    return FlightEstimate(**vars(found), errors=errors)
+
+
+def errors_of(samples: Samples, parameters: FloatArray) -> Noise | None:
+    """The sizes of the errors at parameters near the solution, shape (SIZE,)."""
+    values, _, pulls = _rows(samples, parameters)
+    return noise_of(values, pulls, float(np.std(samples.u)))
 
 
 def drift_blocks(time: FloatArray) -> IntArray:
@@ -267,8 +293,18 @@ def is_physical(parameters: FloatArray) -> bool:
     return bool(values[0] > 0.3 and values[-1] < 3.0 and np.all(lags < LAG_MOST_S))
 
 
-def strength_and_dip(samples: Samples, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
+def strength_and_dip(
+    samples: Samples, parameters: FloatArray, noise: Noise | None = None
+) -> tuple[FloatArray, FloatArray]:
     """Residuals in mGauss of sensor field, shape (n, 2), and derivatives, shape (n, 2, SIZE).
+
+    Parameters
+    ----------
+    samples, parameters
+        Readings, and the parameters in the order of the module's slices, shape (SIZE,).
+    noise
+        Sizes of the errors where those of the control quantity are known too: both residuals are
+        then made independent of each other.
 
     Notes
     -----
@@ -279,6 +315,14 @@ def strength_and_dip(samples: Samples, parameters: FloatArray) -> tuple[FloatArr
     taken along the field (strength) and across it (dip). Slopes are those of the model's field,
     not of the noisy reading, so noise is not taken for soft iron (errors in variables).
     """
+    values, slopes, pulls = _rows(samples, parameters)
+    if noise is None:
+        return values, slopes
+    return whitened(values, pulls, noise), whitened(slopes, pulls, noise)
+
+
+def _rows(samples: Samples, parameters: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Residuals, their derivatives, and their change by one unit of u, as they come."""
     correction = unpack(parameters[:CORRECTION_SIZE])
     strength, sine = parameters[STRENGTH], np.clip(parameters[SIN_DIP], -0.999, 0.999)
     cosine = np.sqrt(1.0 - sine**2)
@@ -288,33 +332,36 @@ def strength_and_dip(samples: Samples, parameters: FloatArray) -> tuple[FloatArr
     level = corrected - np.einsum("ij,ij->i", corrected, down)[:, None] * down
     north = level / np.maximum(np.linalg.norm(level, axis=1), 1e-9)[:, None]
     earth = strength * (cosine * north + sine * down)
-    along, across = _axes(earth, down, inverse)
+    axes = _axes(earth, down, inverse)
     apart = (corrected - earth) @ inverse.T
-    centred = (earth - np.multiply.outer(samples.u, correction.motor)) @ inverse.T
+    pulled = [axis @ inverse for axis in axes]
     slopes = np.empty((len(samples), 2, SIZE))
-    for kind, axis in enumerate((along, across)):
-        pulled = axis @ inverse
-        rows = slopes[:, kind, :]
-        rows[:, MOTOR] = pulled * samples.u[:, None]
-        rows[:, OFFSET] = axis
-        rows[:, _DIAGONAL] = pulled * centred
-        for column, (i, j) in enumerate(((0, 1), (0, 2), (1, 2)), start=9):
-            rows[:, column] = pulled[:, i] * centred[:, j] + pulled[:, j] * centred[:, i]
-        rows[:, STRENGTH] = -np.einsum("ij,ij->i", pulled, earth) / strength
-        rows[:, SIN_DIP] = -strength * np.einsum("ij,ij->i", pulled, down - sine / cosine * north)
+    leaning = _leaning(samples)
+    for kind in range(2):
         # A turn w of the body moves the field in body axes by w × b, which b × pulled weighs.
-        turned = np.cross(earth, pulled)
-        rows[:, FIELD_LAG] = np.einsum("ij,ij->i", turned, np.cross(down, samples.down_rate))
-        rows[:, TILT] = -turned[:, :2]
-        rows[:, LEAN] = -turned[:, :2] * _leaning(samples)
-        rows[:, REGRESSOR_LAG] = np.einsum("ij,ij->i", axis, samples.raw_rate) - (
-            pulled @ correction.motor * samples.u_rate
+        turned = np.cross(earth, pulled[kind])
+        slopes[:, kind, TILT] = -turned[:, :2]
+        slopes[:, kind, LEAN] = -turned[:, :2] * leaning
+        slopes[:, kind, FIELD_LAG] = np.einsum(
+            "ij,ij->i", turned, np.cross(down, samples.down_rate)
         )
-    nuisance = parameters[CORRECTION_SIZE + 4 :]
-    residuals = np.stack(
-        [np.einsum("ij,ij->i", along, apart), np.einsum("ij,ij->i", across, apart)], axis=1
-    )
-    return residuals + slopes[:, :, CORRECTION_SIZE + 4 :] @ nuisance, slopes
+    values = np.stack([np.einsum("ij,ij->i", axis, apart) for axis in axes], axis=1)
+    values += slopes[:, :, CORRECTION_SIZE + 4 :] @ parameters[CORRECTION_SIZE + 4 :]
+    pulls = np.stack([one @ correction.motor for one in pulled], axis=1)
+    centred = (earth - np.multiply.outer(samples.u, correction.motor)) @ inverse.T
+    for kind, (axis, pull) in enumerate(zip(axes, pulled, strict=True)):
+        rows = slopes[:, kind, :]
+        rows[:, MOTOR] = pull * samples.u[:, None]
+        rows[:, OFFSET] = axis
+        rows[:, _DIAGONAL] = pull * centred
+        for column, (i, j) in enumerate(((0, 1), (0, 2), (1, 2)), start=9):
+            rows[:, column] = pull[:, i] * centred[:, j] + pull[:, j] * centred[:, i]
+        rows[:, STRENGTH] = -np.einsum("ij,ij->i", pull, earth) / strength
+        rows[:, SIN_DIP] = -strength * np.einsum("ij,ij->i", pull, down - sine / cosine * north)
+        rows[:, REGRESSOR_LAG] = (
+            np.einsum("ij,ij->i", axis, samples.raw_rate) - pulls[:, kind] * samples.u_rate
+        )
+    return values, slopes, pulls
 
 
 def _axes(
@@ -335,15 +382,12 @@ def _leaning(samples: Samples) -> FloatArray:
     A multirotor accelerates where it leans, and its attitude filter takes the acceleration for
     gravity within a few seconds.
     """
-    # SciPy's filters cost a second to import: only where there is something to fit.
-    from scipy.signal import lfilter  # noqa: PLC0415
-
     if len(samples) < 2:
         return np.zeros((len(samples), 2))
     step = max(float(np.median(np.diff(samples.time))), 1e-3)
     share = step / (LEAN_S + step)
     tilt = samples.attitude[:, :2] - np.median(samples.attitude[:, :2], axis=0)
-    return np.asarray(lfilter([share], [1.0, share - 1.0], tilt, axis=0))
+    return low_pass(tilt, share, 0.0)
 
 
 def vertical_of(parameters: FloatArray) -> float:
