@@ -117,13 +117,20 @@ def analyse(
     earth = expected_earth(recording)
     steps = len(kinds) * len(compasses)
     judged: dict[str, list[_Judged]] = {}
+    lacking: dict[int, MissingDataError] = {}
     for kind in kinds:
         forms = [control for control in found if control.kind == kind]
         for compass in compasses:
             progress(f"compass {compass} by {kind}", sum(map(len, judged.values())) / steps)
-            result = _one(recording, compass, wanted, forms, reported(found), earth)
+            try:
+                result = _one(recording, compass, wanted, forms, reported(found), earth)
+            except MissingDataError as error:
+                lacking.setdefault(compass, error)
+                continue
             forms = [result.problem.control]
             judged.setdefault(kind, []).append(result)
+    if not judged:
+        raise _with_cure(recording, compasses[0], lacking[compasses[0]])
     progress("done", 1.0)
     chosen = _choose(judged)
     emitted = emit(recording, [j.fit for j in judged[chosen]])
@@ -141,7 +148,7 @@ def analyse(
             )
             for j in judged[chosen]
         ),
-        notes=tuple(_notes(recording, wanted, judged, chosen)),
+        notes=(*_notes(recording, wanted, judged, chosen), *_lacking_notes(lacking, judged)),
         only_to_look_at=why_not,
     )
 
@@ -296,6 +303,22 @@ def _choose(judged: Mapping[str, list[_Judged]]) -> str:
     if rejected[THROTTLE] or rejected[CURRENT]:
         return CURRENT if rejected[THROTTLE] else THROTTLE
     return THROTTLE if unexplained(THROTTLE) < BETTER * unexplained(CURRENT) else CURRENT
+
+
+def _with_cure(recording: Recording, compass: int, lacking: MissingDataError) -> MissingDataError:
+    if compass not in recording.field:
+        return lacking
+    how = autopilots.of(recording).how_to_record("more readings", recording.format)
+    return MissingDataError(f"{lacking}: {how}")
+
+
+def _lacking_notes(
+    lacking: Mapping[int, MissingDataError], judged: Mapping[str, list[_Judged]]
+) -> Iterable[str]:
+    done = {j.fit.compass for results in judged.values() for j in results}
+    for compass, why in sorted(lacking.items()):
+        if compass not in done:
+            yield f"compass {compass} is left out: {why}"
 
 
 def _notes(
