@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from magcomp import __version__, autopilots
-from magcomp.autopilots import Kind
+from magcomp.autopilots import Autopilot, Kind
 from magcomp.model import Analysis, CompassResult, Grade, MotorFit, ParameterSet, Recording
 
 
@@ -41,24 +42,44 @@ def emit(recording: Recording, fits: Sequence[MotorFit]) -> Mapping[int, Emissio
     autopilot = autopilots.of(recording)
     values = recording.parameters.latest
     fitted = [fit.compass for fit in fits]
+    changed = not all(fit.kept for fit in fits)
+    regressor = fits[0].regressor
+    switch = autopilot.switch_parameters(regressor, fitted, values, battery=recording.battery)
     return {
         fit.compass: Emission(
             accepted={
-                **autopilot.switch_parameters(
-                    fit.regressor, fitted, values, battery=recording.battery
-                ),
-                **autopilot.correction_parameters(
-                    fit.correction,
-                    fit.compass,
-                    values,
-                    regressor=fit.regressor,
-                    soft_iron_fitted="diagonal" in fit.free,
-                ),
+                **(switch if changed else {}),
+                **_of_correction(autopilot, fit, values, in_force=not changed),
             },
             left_out=autopilot.neutral_parameters(fit.compass, fit.regressor, values),
         )
         for fit in fits
     }
+
+
+def _of_correction(
+    autopilot: Autopilot, fit: MotorFit, values: Mapping[str, float], *, in_force: bool
+) -> dict[str, float]:
+    """A correction's parameters; those of one that stays keep their stored values to the bit."""
+    made = autopilot.correction_parameters(
+        fit.correction,
+        fit.compass,
+        values,
+        regressor=fit.regressor,
+        soft_iron_fitted="diagonal" in fit.free and not fit.kept,
+    )
+    if not fit.kept:
+        return made
+    return {
+        name: values[name]
+        if name in values and (in_force or _alike(value, values[name]))
+        else value
+        for name, value in made.items()
+    }
+
+
+def _alike(first: float, second: float) -> bool:
+    return math.isclose(first, second, rel_tol=1e-5, abs_tol=1e-5)
 
 
 def parameter_set(

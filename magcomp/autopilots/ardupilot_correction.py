@@ -48,6 +48,9 @@ class MotorCompensation(IntEnum):
 COMPENSATION_OF = {CURRENT: MotorCompensation.CURRENT, THROTTLE: MotorCompensation.THROTTLE}
 """COMPASS_MOTCT that makes the autopilot multiply by a control quantity."""
 
+_WORST_CONDITION = 1e3
+"""A soft iron that stretches one direction so much more than another is no calibration."""
+
 _REGRESSOR_OF = {switch: kind for kind, switch in COMPENSATION_OF.items()}
 _KIND_OF = {name: found.kind for name in ACTING if (found := parse(name)) is not None}
 
@@ -155,16 +158,18 @@ def correction_parameters(correction: Correction, compass: int, scale: float) ->
 def calibration(values: Mapping[str, float], compass: int) -> Calibration:
     """Calibration of one compass; names not among ``values`` have the firmware's defaults."""
 
-    def vector(kind: str) -> FloatArray:
-        return np.array([values.get(name, 0.0) for name in vector_names(kind, compass)])
+    def vector(kind: str, default: float = 0.0) -> FloatArray:
+        return np.array([values.get(name, default) for name in vector_names(kind, compass)])
 
+    # Where a part of it is told the firmware has it, and 1 is the default of the rest.
+    has_soft_iron = any(name in values for name in vector_names("DIA", compass))
     scale = scale_in_force(values, compass)
     kind = values.get(COMPENSATION_SWITCH, 0.0)
     compensation = MotorCompensation(int(kind)) if kind in (0.0, 1.0, 2.0) else MotorCompensation(0)
     off = compensation is MotorCompensation.OFF
     return Calibration(
         offset=vector("OFS"),
-        soft_iron=soft_iron_matrix(vector("DIA"), vector("ODI")),
+        soft_iron=soft_iron_matrix(vector("DIA", float(has_soft_iron)), vector("ODI")),
         scale=scale,
         motor=np.zeros(3) if off else vector("MOT"),
         compensation=compensation,
@@ -215,6 +220,27 @@ def not_finite(values: Mapping[str, float], when: str = "") -> ParameterFileErro
         f"holds {held}{when}: set {'them' if many else 'it'} to {neutral} on the vehicle and "
         "record again"
     )
+
+
+def not_undoable(parameters: ParameterHistory, compass: int) -> ParameterFileError | None:
+    """The error that a soft iron once in force has no inverse; None where all have one."""
+    diagonal, off_diagonal = vector_names("DIA", compass), vector_names("ODI", compass)
+    names = (*diagonal, *off_diagonal)
+    seen = set()
+    for moment in (-math.inf, *calibration_changes(parameters, names)):
+        told = {name: parameters.at(name, moment, 0.0) for name in names if parameters.of(name)}
+        values = tuple(told.values())
+        if values in seen:
+            continue
+        seen.add(values)
+        if np.linalg.cond(calibration(told, compass).soft_iron) > _WORST_CONDITION:
+            held = ", ".join(f"{name} {value:g}" for name, value in told.items())
+            return ParameterFileError(
+                f"{diagonal[0][:-2]} and {off_diagonal[0][:-2]} must be a soft iron that can be "
+                f"undone; instead the log holds {held}: set those of DIA to 1 and of ODI to 0 on "
+                "the vehicle and record again"
+            )
+    return None
 
 
 def calibration_changes(

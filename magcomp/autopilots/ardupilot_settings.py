@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from magcomp.autopilots.ardupilot_correction import is_scale_used, not_finite
+from magcomp.autopilots.ardupilot_correction import is_scale_used, not_finite, not_undoable
 from magcomp.autopilots.ardupilot_names import (
     ACTING,
     COMPENSATION_SWITCH,
@@ -75,6 +75,8 @@ def left_out(parameters: ParameterHistory) -> dict[int, InputError]:
         }
         if bad:
             found[number] = not_finite(bad)
+        elif (error := not_undoable(parameters, number)) is not None:
+            found[number] = error
     if parameters.last(PER_MOTOR_SWITCH, 0.0):
         found[1] = MissingDataError(
             f"{PER_MOTOR_SWITCH} must be 0 while compass 1 is recorded; instead it is on, and a "

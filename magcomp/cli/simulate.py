@@ -69,6 +69,13 @@ _ADDRESS = "udpout:127.0.0.1:14550"
     metavar="FILE",
     help="Sign every frame, and take none that is not signed.",
 )
+@click.option(
+    "--system",
+    type=click.IntRange(1, 250),
+    default=1,
+    show_default=True,
+    help="Its MAVLink system, where several share a link.",
+)
 def simulate(
     address: str,
     seed: int,
@@ -79,6 +86,7 @@ def simulate(
     truth: Path | None,
     parameters: Path | None,
     signing_key: Path | None,
+    system: int,
 ) -> ExitCode:
     """Be an ArduCopter with three compasses, reached at ADDRESS (udpout:127.0.0.1:14550).
 
@@ -96,6 +104,7 @@ def simulate(
         wait_for_ground=True,
         signing_key=key,
         parameters=held,
+        system=system,
     )
     if truth is not None:
         chosen.truth.write(truth)

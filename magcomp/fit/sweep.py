@@ -37,6 +37,10 @@ from magcomp.model import (
 STILL_TILT_RAD = np.radians(5.0)
 """A vehicle on its legs tilts less than this with its motors running."""
 
+STILL_WOBBLE_RAD, _WOBBLE_S = np.radians(0.2), 5.0
+"""A vehicle on its legs stays within this of its mean attitude over seconds for half of the time;
+one that hovers never does."""
+
 STILL_SHARE = 0.02
 """Standing still, the control quantity explains the field but for this share of its strength."""
 
@@ -53,13 +57,24 @@ def is_still(samples: Samples) -> bool:
     """
     middle = np.median(samples.attitude[:, :2], axis=0)
     tilt = np.quantile(np.abs(samples.attitude[:, :2] - middle), 0.95, axis=0)
-    if np.any(tilt > STILL_TILT_RAD):
+    if np.any(tilt > STILL_TILT_RAD) or _wobble(samples) > STILL_WOBBLE_RAD:
         return False
     design = np.column_stack([np.ones(len(samples)), samples.u])
     line = np.linalg.lstsq(design, samples.raw, rcond=None)[0]
     left = np.linalg.norm(samples.raw - design @ line, axis=1)
     strength = float(np.median(np.linalg.norm(samples.present, axis=1)))
     return bool(np.median(left) < STILL_SHARE * strength)
+
+
+def _wobble(samples: Samples) -> float:
+    """Median departure of roll and pitch from their mean over seconds, radians, the larger one."""
+    block = time_blocks(samples.time, _WOBBLE_S)
+    count = np.bincount(block)
+    apart = [
+        np.median(np.abs(angle - (np.bincount(block, angle) / np.maximum(count, 1))[block]))
+        for angle in samples.attitude[:, :2].T
+    ]
+    return float(max(apart))
 
 
 def fit_sweep(problem: Problem, *, lag: float | None = None) -> MotorFit:

@@ -43,7 +43,12 @@ def control_grid(fit: MotorFit) -> FloatArray:
 
 
 def heading_errors(
-    fit: MotorFit, present: Correction, present_u: FloatArray, rng: np.random.Generator
+    fit: MotorFit,
+    present: Correction,
+    present_u: FloatArray,
+    rng: np.random.Generator,
+    *,
+    keep: bool = False,
 ) -> tuple[HeadingError, ...]:
     """Largest heading error over all yaws, level and tilted, by control quantity.
 
@@ -58,6 +63,8 @@ def heading_errors(
         :func:`control_grid`, shape (k,).
     rng
         For the draws from the covariance.
+    keep
+        ``after`` and ``p95`` of ``present``, which is left as it is, instead of the fit.
 
     Notes
     -----
@@ -77,11 +84,12 @@ def heading_errors(
         raw = (field - u * fit.correction.motor) @ inverse.T - fit.correction.offset
         before = present.apply(raw, np.full(len(raw), u_present))
         slopes = _shift_slopes(field, raw + fit.correction.offset, roll, pitch, u, fit)
-        largest = np.abs(draws @ slopes.T).max(axis=1)
+        off = shifts(before, field, roll, pitch)
+        largest = np.abs(draws @ slopes.T + (off if keep else 0.0)).max(axis=1)
         rows.append(
             HeadingError(
                 u=float(u),
-                before=largest_shift(before, field, roll, pitch),
+                before=float(np.degrees(np.abs(off).max())),
                 after=min(float(np.degrees(np.median(largest))), 180.0),
                 p95=min(float(np.degrees(np.quantile(largest, 0.95))), 180.0),
             )
@@ -93,10 +101,15 @@ def largest_shift(
     found: FloatArray, true: FloatArray, roll: FloatArray, pitch: FloatArray
 ) -> float:
     """Largest difference of heading between two fields, degrees."""
+    return float(np.degrees(np.abs(shifts(found, true, roll, pitch)).max()))
+
+
+def shifts(found: FloatArray, true: FloatArray, roll: FloatArray, pitch: FloatArray) -> FloatArray:
+    """Difference of heading between two fields at each attitude, radians, shape (k,)."""
     level = level_matrix(roll, pitch)
     found, true = (np.einsum("kij,kj->ki", level, f) for f in (found, true))
     shift = np.arctan2(-found[:, 1], found[:, 0]) - np.arctan2(-true[:, 1], true[:, 0])
-    return float(np.degrees(np.abs(wrap_angle(shift)).max()))
+    return np.asarray(wrap_angle(shift))
 
 
 def _shift_slopes(

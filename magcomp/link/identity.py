@@ -11,7 +11,7 @@ from magcomp.link.framing import Message
 from magcomp.mavlink.header import payload
 from magcomp.mavlink.heartbeat import Identity, identify
 from magcomp.mavlink.parameters import decode_param_value, encoding
-from magcomp.mavlink.version import firmware_version, unique_id
+from magcomp.mavlink.version import board_name, firmware_version, unique_id
 from magcomp.model import Vehicle
 
 _BANNER = re.compile(r"\bV(\d+\.\d+\.\d+)")
@@ -78,8 +78,7 @@ class Identification:
             self._capabilities = message.capabilities
             self._firmware = firmware_version(message.flight_sw_version) or self._firmware
             self._uid = unique_id(bytes(message.uid2), message.uid)
-            # ArduPilot: APJ board id in the upper half.
-            self._board = f"board {message.board_version >> 16}" if message.board_version else ""
+            self._board = board_name(message.board_version)
         elif kind == "STATUSTEXT" and not self._firmware:
             banner = _BANNER.search(message.text)
             self._firmware = banner[1] if banner else ""

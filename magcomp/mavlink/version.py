@@ -1,4 +1,4 @@
-"""What AUTOPILOT_VERSION says of a vehicle: its firmware, and the number of its own."""
+"""What AUTOPILOT_VERSION says of a vehicle: its firmware, its board, and its own number."""
 
 from __future__ import annotations
 
@@ -19,6 +19,25 @@ def firmware_version(packed: int) -> str:
     if not packed:
         return ""
     return f"{packed >> 24 & 255}.{packed >> 16 & 255}.{packed >> 8 & 255}"
+
+
+_BOARD = "board "
+
+
+def board_name(packed: int) -> str:
+    """AUTOPILOT_VERSION.board_version, whose upper half is the number of the kind of board.
+
+    Examples
+    --------
+    >>> board_name(140 << 16)
+    'board 140'
+    """
+    return f"{_BOARD}{packed >> 16}" if packed else ""
+
+
+def is_numbered_board(name: str) -> bool:
+    """Whether a board's name is a number, as on a link, and not a word, as in some logs."""
+    return name.startswith(_BOARD)
 
 
 def unique_id(uid2: bytes, uid: int) -> str:

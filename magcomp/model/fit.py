@@ -138,6 +138,9 @@ class MotorFit:
         Range of the control quantity the data cover (2nd and 98th percentile).
     count
         Readings used.
+    kept
+        Whether the correction is the one that was in force, because the data cannot tell it from
+        a better one.
     """
 
     compass: int
@@ -158,6 +161,7 @@ class MotorFit:
     u_low: float
     u_high: float
     count: int
+    kept: bool = False
 
     @property
     def interference(self) -> FloatArray:

@@ -5,6 +5,7 @@ given frames and time, or a :class:`LocalConnection` to one. On a link in real t
 """
 
 from magcomp.simulate.faults import Faults, FaultyLink, Machine
+from magcomp.simulate.habits import CAMERA, COMPUTER, GIMBAL, Companion, Habits
 from magcomp.simulate.local import LocalConnection
 from magcomp.simulate.programs import PROGRAMS, Scenario, scenario
 from magcomp.simulate.recording import record, write_tlog
@@ -13,10 +14,15 @@ from magcomp.simulate.truth import Truth
 from magcomp.simulate.vehicle import Frame, Vehicle
 
 __all__ = [
+    "CAMERA",
+    "COMPUTER",
+    "GIMBAL",
     "PROGRAMS",
+    "Companion",
     "Faults",
     "FaultyLink",
     "Frame",
+    "Habits",
     "LocalConnection",
     "Machine",
     "Scenario",

@@ -8,6 +8,7 @@ The rules, as in ArduCopter 4.6 (AUTOPILOTS.md, "Parameters" and "Rates"):
 - The parameter list comes at its own pace; asking again begins it again.
 - At most 20 requests to read one parameter wait; more are dropped.
 - A command that is not known is acknowledged as unsupported.
+- With SYSID_ENFORCE only the ground station whose system is SYSID_MYGCS is listened to.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from typing import Any, ClassVar
 import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from magcomp.simulate.habits import BOARD_VERSION, Habits
 from magcomp.simulate.parameters import ParameterStore, is_read_only
 from magcomp.simulate.streams import GROUPS, TELEMETRY, Schedule
 
@@ -45,6 +47,8 @@ class Autopilot:
         MAVLink identity.
     answers_errors
         Answer with PARAM_ERROR where 4.6 is silent, as newer firmware does.
+    habits
+        What it does besides.
     """
 
     def __init__(
@@ -54,8 +58,11 @@ class Autopilot:
         component: int = 1,
         *,
         answers_errors: bool = False,
+        habits: Habits | None = None,
     ) -> None:
         self.store = store
+        self._habits = habits or Habits()
+        self._now_s = 0.0
         self._answers_errors = answers_errors
         self.system = system
         self.component = component
@@ -86,8 +93,10 @@ class Autopilot:
             mavlink.MAVLink_statustext_message(severity, text.encode("ascii")[:50])
         )
 
-    def send_paced(self) -> None:
-        """Send the next few parameters that were asked for; called every 10 ms."""
+    def send_paced(self, now_s: float) -> None:
+        """Store and send the next few parameters; called every 10 ms, in seconds since power-up."""
+        self._now_s = now_s
+        self.store.settle(now_s)
         for _ in range(min(_READS_PER_10_MS, len(self._reads))):
             self._answer_read(self._reads.popleft())
         names = len(self.store.listed) if self._list else 0
@@ -117,6 +126,9 @@ class Autopilot:
 
     def handle(self, message: Any, now_ms: int) -> None:
         """Act on one message from the ground; answers are in ``outgoing``."""
+        stranger = message.get_srcSystem() != self.store["SYSID_MYGCS"]
+        if stranger and self.store["SYSID_ENFORCE"]:
+            return
         for_system = getattr(message, "target_system", 0)
         for_component = getattr(message, "target_component", 0)
         if for_system not in (0, self.system) or for_component not in (0, self.component):
@@ -156,14 +168,27 @@ class Autopilot:
             flight_sw_version=major << 24 | minor << 16 | patch << 8 | 255,
             middleware_sw_version=0,
             os_sw_version=0,
-            board_version=0,
+            board_version=BOARD_VERSION,
             flight_custom_version=tuple(GIT_HASH.encode("ascii")),
             middleware_custom_version=(0,) * 8,
             os_custom_version=(0,) * 8,
             vendor_id=0,
             product_id=0,
             uid=0,
+            uid2=tuple((self._habits.uid or b"").ljust(18, b"\0")),
         )
+
+    def companions(self) -> list[tuple[int, Any]]:
+        """A heartbeat of everybody else in this system, with the component that sends it."""
+        return [
+            (
+                other.component,
+                mavlink.MAVLink_heartbeat_message(
+                    other.mav_type, other.autopilot, 0, 0, mavlink.MAV_STATE_ACTIVE, 3
+                ),
+            )
+            for other in self._habits.companions
+        ]
 
     def _arming_objection(self) -> str | None:
         most = self.store["COMPASS_OFFS_MAX"]
@@ -182,7 +207,7 @@ class Autopilot:
         self.outgoing.append(
             mavlink.MAVLink_param_value_message(
                 param_id=name.encode("ascii"),
-                param_value=self.store[name],
+                param_value=np.nan if name in self._habits.not_numbers else self.store[name],
                 param_type=self.store.type_of(name),
                 param_count=len(self.store.listed) if count is None else count,
                 param_index=index,
@@ -212,12 +237,15 @@ class Autopilot:
             self._object(message, "DOES_NOT_EXIST")
         elif not np.isfinite(value):
             self._object(message, "VALUE_OUT_OF_RANGE")
-        elif is_read_only(name):
+        elif name in self._habits.ignored:
+            return
+        elif is_read_only(name) or name in self._habits.denied:
             self.say(f"Param write denied ({name})", mavlink.MAV_SEVERITY_WARNING)
             self._object(message, "READ_ONLY")
             self._send_parameter(name, _NO_INDEX)
         else:
-            self.store.put(name, value)
+            low, high = self._habits.clamped.get(name, (-np.inf, np.inf))
+            self.store.write(name, min(max(value, low), high), self._now_s)
             for echoed in self.store.echoed(name):
                 self._send_parameter(echoed, _NO_INDEX)
 

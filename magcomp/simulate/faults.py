@@ -9,7 +9,7 @@ from __future__ import annotations
 import heapq
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -57,6 +57,11 @@ class Faults:
         At this counted message, which is lost, the vehicle reboots; the first is number 1.
     dead_at
         From this counted message on, which is lost too, nothing passes.
+    arm_at
+        At this counted message somebody arms the vehicle.
+    stranger
+        System and component of somebody who confirms every write the ground sends, at once, lost
+        or not.
     counted
         Numbers of the MAVLink messages that count, in both directions together.
     """
@@ -68,6 +73,8 @@ class Faults:
     latency_s: float = 0.0
     reboot_at: int | None = None
     dead_at: int | None = None
+    arm_at: int | None = None
+    stranger: tuple[int, int] | None = None
     counted: frozenset[int] = WRITING
 
     def __post_init__(self) -> None:
@@ -106,10 +113,14 @@ class FaultyLink:
         self._down = _Direction(faults, rng)
         self.counted = 0
         self.dead = False
+        self._codec: Any = mavlink.MAVLink(None)
+        self._injected: list[Frame] = []
 
     def receive(self, frame: bytes, time: float) -> None:
         """Take one frame from the ground; see :class:`Machine`."""
         self._up.send(Frame(time, frame))
+        if self._faults.stranger is not None:
+            self._confirm(frame, time, self._faults.stranger)
 
     def advance(self, time: float) -> list[Frame]:
         """Let time pass; see :class:`Machine`."""
@@ -118,7 +129,20 @@ class FaultyLink:
                 self._vehicle.receive(frame.data, frame.time)
                 self._collect(frame.time)
         self._collect(time)
-        return self._down.arrived(time)
+        injected, self._injected = self._injected, []
+        return [*injected, *self._down.arrived(time)]
+
+    def _confirm(self, frame: bytes, time: float, stranger: tuple[int, int]) -> None:
+        """Say in a stranger's name that a write was carried out."""
+        if message_id(frame) != mavlink.MAVLINK_MSG_ID_PARAM_SET:
+            return
+        asked = self._codec.decode(bytearray(frame))
+        value = mavlink.MAVLink_param_value_message(
+            asked.param_id.encode(), asked.param_value, asked.param_type, 1, 65535
+        )
+        system, component = stranger
+        codec: Any = mavlink.MAVLink(None, srcSystem=system, srcComponent=component)
+        self._injected.append(Frame(time, bytes(value.pack(codec))))
 
     def _collect(self, time: float) -> None:
         """Put what the vehicle has sent on its way down."""
@@ -142,6 +166,8 @@ class FaultyLink:
             if self.counted == self._faults.reboot_at:
                 self._vehicle.reboot()
                 return False
+            if self.counted == self._faults.arm_at:
+                self._vehicle.arm()
         return True
 
 

@@ -47,15 +47,25 @@ _LIMITS = {
 
 
 class ParameterStore:
-    """Values that survive a reboot.
+    """What is in force, and what a reboot brings back.
 
     Parameters
     ----------
     values
         What differs from the firmware's defaults.
+    storage_s
+        Seconds within which a write reaches the memory that survives, in any order.
+    seed
+        Of that order.
     """
 
-    def __init__(self, values: Mapping[str, float]) -> None:
+    def __init__(
+        self, values: Mapping[str, float], *, storage_s: float = 0.0, seed: int = 0
+    ) -> None:
+        self._storage_s = storage_s
+        self._rng = np.random.default_rng([seed, 6])
+        self._stored: dict[str, float] = {}
+        self._pending: list[tuple[float, str]] = []
         self._types: dict[str, ParameterType] = {}
         self._values: dict[str, float] = {}
         self.version = 0
@@ -68,6 +78,7 @@ class ParameterStore:
                     self._values[hidden] = 0.65 if hidden.endswith("EXP") else 0.0
         for name, value in values.items():
             self.put(name, value)
+        self._stored = dict(self._values)
 
     def __getitem__(self, name: str) -> float:
         return self._values[name]
@@ -91,15 +102,36 @@ class ParameterStore:
         """How the autopilot stores it."""
         return self._types[name]
 
+    def write(self, name: str, value: float, now_s: float) -> None:
+        """Take a value into force at once, and into the memory that survives some time later."""
+        stored = self._stored[name]
+        self.put(name, value)
+        self._stored[name] = stored
+        self._pending.append((now_s + self._storage_s * self._rng.random(), name))
+
+    def settle(self, now_s: float) -> None:
+        """Store what has been waiting long enough: the value that is in force by now."""
+        if self._pending:
+            for due, name in self._pending:
+                if due <= now_s:
+                    self._stored[name] = self._values[name]
+            self._pending = [each for each in self._pending if each[0] > now_s]
+
+    def reboot(self) -> None:
+        """Bring back what had been stored."""
+        self._pending.clear()
+        self._values.update(self._stored)
+        self.version += 1
+
     def put(self, name: str, value: float) -> None:
-        """Store a value as the autopilot's type can hold it."""
+        """Hold and store a value as the autopilot's type can hold it."""
         kind = self._types[name]
         if kind is ParameterType.REAL32:
             stored = float(np.float32(value))
         else:
             low, high = _LIMITS[kind]
             stored = float(int(min(max(value + np.copysign(_ROUNDING, value), low), high)))
-        self._values[name] = stored
+        self._values[name] = self._stored[name] = stored
         self.version += 1
 
     def echoed(self, name: str) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ the same input gives the same bytes.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,6 +21,7 @@ from magcomp.simulate import physics, telemetry
 from magcomp.simulate.ahrs import Ahrs
 from magcomp.simulate.autopilot import Autopilot
 from magcomp.simulate.correction import Correction
+from magcomp.simulate.habits import Habits, own_number
 from magcomp.simulate.outputs import motor_outputs
 from magcomp.simulate.parameters import ParameterStore, initial_values
 from magcomp.simulate.pilot import Pilot
@@ -65,6 +67,8 @@ class Vehicle:
         Send PARAM_ERROR where 4.6 is silent, as newer firmware does.
     system
         MAVLink system number.
+    habits
+        What it is and does besides the ordinary.
     """
 
     def __init__(
@@ -77,14 +81,24 @@ class Vehicle:
         signing_key: bytes | None = None,
         answers_errors: bool = False,
         system: int = 1,
+        habits: Habits | None = None,
     ) -> None:
         self.truth = scenario.truth
+        seed, habits = scenario.truth.seed, habits or Habits()
+        if habits.uid is None:
+            habits = replace(habits, uid=own_number(seed))
         self._program = scenario.begin()
         self._pilot = Pilot(self._program)
         self._mode = scenario.mode
         self._start_unix_s = start_unix_s
-        self._store = ParameterStore({**initial_values(scenario.truth), **(parameters or {})})
-        self._autopilot = Autopilot(self._store, system, answers_errors=answers_errors)
+        self._store = ParameterStore(
+            {**initial_values(scenario.truth), **(parameters or {})},
+            storage_s=habits.storage_s,
+            seed=seed,
+        )
+        self._autopilot = Autopilot(
+            self._store, system, answers_errors=answers_errors, habits=habits
+        )
         self._correction = Correction(self._store)
         self._signing_key = signing_key
         self._tick = 0
@@ -159,8 +173,18 @@ class Vehicle:
         frames, self._sent = self._sent, []
         return frames
 
+    def arm(self) -> None:
+        """Arm, as by a pilot whom nobody expects."""
+        self._autopilot.arm(force=True)
+
+    def disarm(self) -> None:
+        """Disarm, wherever it is."""
+        self._autopilot.disarm(force=True)
+
     def reboot(self) -> None:
         """Restart: motors off, streams forgotten, stored parameters kept, a moment's silence."""
+        self._store.settle(self.time)
+        self._store.reboot()
         self._boot_tick = self._tick + _BOOT_TICKS
         self._codec = self._new_codec()
         self._autopilot.start_up()
@@ -269,10 +293,11 @@ class Vehicle:
         since_boot = self._tick - self._boot_tick
         if since_boot % _HEARTBEAT_TICKS == 0:
             autopilot.outgoing.append(autopilot.heartbeat())
+            self._accompany()
         if since_boot % _TIMESYNC_TICKS == 0:
             stamp = self._boot_ms * 1_000_000 + 1
             autopilot.outgoing.append(mavlink.MAVLink_timesync_message(tc1=0, ts1=stamp))
-        autopilot.send_paced()
+        autopilot.send_paced(self.time)
         wanted = autopilot.schedule.due(self._boot_ms)
         if wanted or autopilot.once:
             self._report(wanted, step)
@@ -301,6 +326,14 @@ class Vehicle:
                 wanted = [message, *wanted]
         built = (telemetry.build(message, view) for message in wanted)
         autopilot.outgoing.extend(message for message in built if message is not None)
+
+    def _accompany(self) -> None:
+        """Let the other components of the system say that they are there."""
+        for component, message in self._autopilot.companions():
+            codec: Any = mavlink.MAVLink(
+                None, srcSystem=self._autopilot.system, srcComponent=component
+            )
+            self._sent.append(Frame(self.time, bytes(message.pack(codec))))
 
     def _flush(self) -> None:
         """Put what the autopilot wants to say into frames."""

@@ -175,6 +175,7 @@ def _recording(decoded: Decoded, source: str, kind: str) -> Recording:
             component=who.component,
             firmware=quantities.firmware(messages),
             compasses=autopilots.named(who.autopilot).compasses(parameters.latest),
+            board=quantities.board(messages),
             capabilities=quantities.capabilities(messages),
             uid=quantities.uid(messages),
         ),

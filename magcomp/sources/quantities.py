@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from magcomp.mavlink.heartbeat import is_armed
 from magcomp.mavlink.messages import Message, Table, text
 from magcomp.mavlink.parameters import decode_values, encoding
-from magcomp.mavlink.version import firmware_version, unique_id
+from magcomp.mavlink.version import board_name, firmware_version, unique_id
 from magcomp.model import FloatArray, ParameterChange, Series
 
 STANDARD_GRAVITY = 9.80665
@@ -199,6 +199,13 @@ def capabilities(messages: Messages) -> int:
     if Message.AUTOPILOT_VERSION not in messages:
         return 0
     return int(messages[Message.AUTOPILOT_VERSION].table["capabilities"][-1])
+
+
+def board(messages: Messages) -> str:
+    """The kind of flight controller; empty where it was not reported."""
+    if Message.AUTOPILOT_VERSION not in messages:
+        return ""
+    return board_name(int(messages[Message.AUTOPILOT_VERSION].table["board_version"][-1]))
 
 
 def uid(messages: Messages) -> str:

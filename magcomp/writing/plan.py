@@ -14,8 +14,11 @@ from dataclasses import dataclass, replace
 from magcomp import autopilots
 from magcomp.autopilots import Kind
 from magcomp.errors import ParameterFileError, VehicleRefusedError, WriteError
+from magcomp.mavlink.version import is_numbered_board
 from magcomp.model import Compass, ParameterSet, Vehicle
 from magcomp.writing.files import as_float32, format_value
+
+_BOTH = 2
 
 
 @dataclass(frozen=True)
@@ -211,10 +214,8 @@ def _check_identity(wanted: ParameterSet, actual: Vehicle, *, any_vehicle: bool)
         same = _stand_alike(compasses, actual.compasses) and (
             owner is None or _may_be_one(owner, actual)
         )
-        if same and compasses:
-            return ()
         if same:
-            return ("The parameters name no compass, so only the system number was compared.",)
+            return _unproven(owner, actual, named=bool(compasses))
         named = _described(owner) if owner else f"compasses {_listed(compasses)}"
         complaint = f"the vehicle must be {named}; instead it is {_described(actual)}"
     if not any_vehicle:
@@ -223,9 +224,29 @@ def _check_identity(wanted: ParameterSet, actual: Vehicle, *, any_vehicle: bool)
 
 
 def _may_be_one(owner: Vehicle, actual: Vehicle) -> bool:
-    twins = owner.uid and actual.uid and owner.uid != actual.uid
     same = (owner.autopilot, owner.system) == (actual.autopilot, actual.system)
-    return same and not twins
+    boards = {board for board in (owner.board, actual.board) if is_numbered_board(board)}
+    return same and len(boards) < _BOTH and _same_number(owner, actual) is not False
+
+
+def _same_number(owner: Vehicle | None, actual: Vehicle) -> bool | None:
+    """Whether the flight controller is the very same; None where one of both has no number."""
+    if owner is None or not owner.uid or not actual.uid:
+        return None
+    return owner.uid == actual.uid
+
+
+def _unproven(owner: Vehicle | None, actual: Vehicle, *, named: bool) -> tuple[str, ...]:
+    """What could not be compared, for the pilot to look at."""
+    if _same_number(owner, actual):
+        return ()
+    if not named:
+        return ("The parameters name no compass, so only the system number was compared.",)
+    who = "The parameters" if owner is None or not owner.uid else "The vehicle"
+    return (
+        f"{who} give{'s' if who == 'The vehicle' else ''} no number of the flight controller, so "
+        "another vehicle with the same compasses would not be told from this one.",
+    )
 
 
 def _stand_alike(wanted: Iterable[Compass], actual: Iterable[Compass]) -> bool:
@@ -237,6 +258,7 @@ def _stand_alike(wanted: Iterable[Compass], actual: Iterable[Compass]) -> bool:
 def _described(vehicle: Vehicle) -> str:
     return (
         f"{vehicle.autopilot} system {vehicle.system} with compasses {_listed(vehicle.compasses)}"
+        + (f", {vehicle.board}" if vehicle.board else "")
         + (f" and flight controller {vehicle.uid}" if vehicle.uid else "")
     )
 

@@ -222,6 +222,25 @@ def test_a_value_that_is_none_leaves_out_its_own_compass_alone(compass, value, k
         assert "-inf" not in said
 
 
+def test_a_soft_iron_that_is_told_in_part_is_whole_with_the_firmwares_defaults():
+    values = {"COMPASS_DIA_X": 1.0, "COMPASS_DIA_Z": 1.25}
+    found = ARDUPILOT.in_force(values, 1).correction.soft_iron
+    np.testing.assert_array_equal(found, np.diag([1.0, 1.0, 1.25]))
+
+
+@pytest.mark.parametrize("value", [0.0, 1e-9, 1e30])
+def test_a_compass_whose_soft_iron_cannot_be_undone_is_left_out_and_no_other(value):
+    changes = (
+        ParameterChange(0.0, "COMPASS_DIA2_X", 1.0),
+        ParameterChange(5.0, "COMPASS_DIA2_Y", value),
+        ParameterChange(9.0, "COMPASS_DIA2_Y", 1.0),
+    )
+    found = ARDUPILOT.left_out(ParameterHistory(changes))
+    assert set(found) == {2}
+    assert "COMPASS_DIA2 and COMPASS_ODI2 must be a soft iron" in str(found[2])
+    assert f"COMPASS_DIA2_Y {value:g}" in str(found[2])
+
+
 def test_a_compass_corrected_per_motor_is_left_out():
     parameters = history(held(COMPASS_PMOT_EN=1.0))
     found = ARDUPILOT.left_out(parameters)

@@ -24,7 +24,17 @@ from magcomp.model import ParameterSet, Vehicle, compasses_of
 
 SYSTEM, COMPONENT = 1, 1
 DEVICES = (97539, 131874, 263178)
-QUAD = Vehicle("ardupilot", "copter", SYSTEM, COMPONENT, "4.6.3", compasses_of(DEVICES))
+UID = bytes.fromhex("270051001551353337393731")
+QUAD = Vehicle(
+    "ardupilot",
+    "copter",
+    SYSTEM,
+    COMPONENT,
+    "4.6.3",
+    compasses_of(DEVICES),
+    board="board 140",
+    uid=UID.hex(),
+)
 INT8, INT32, REAL32 = 2, 6, 9
 BOOT_TIME = 3.0  # seconds a reboot takes
 STORE_TIME = 0.8  # seconds until a write has surely reached the storage
@@ -84,6 +94,7 @@ class FakeAutopilot:
         self.reports_errors = False
         self.quiet_when_unchanged = False
         self.answers_timesync = True
+        self.uid = UID
         self.armed = False
         self.booted_at = 0.0
         self.stored = dict(self.values)
@@ -132,8 +143,15 @@ class FakeAutopilot:
             case "TIMESYNC" if message.tc1 == 0 and self.answers_timesync:
                 since = int(1e9 * max(0.0, now - self.booted_at)) + 1
                 return [mavlink.MAVLink_timesync_message(since, message.ts1)]
+            case "COMMAND_LONG" if (message.command, message.param1) == (512, 148):
+                return [self._version()]
             case _:
                 return []
+
+    def _version(self) -> Any:
+        return mavlink.MAVLink_autopilot_version_message(
+            0, 0, 0, 0, 140 << 16, [0] * 8, [0] * 8, [0] * 8, 0, 0, 0, [*self.uid.ljust(18, b"\0")]
+        )
 
     def _set(self, name: str, value: float, now: float) -> list[Any]:
         self.writes.append((name, value))

@@ -123,6 +123,9 @@ STRANGERS = [
     replace(QUAD, compasses=compasses_of((1, 2, 3))),
     replace(QUAD, compasses=compasses_of((*DEVICES[1:], DEVICES[0]))),
     replace(QUAD, compasses=compasses_of((*DEVICES, 4))),
+    replace(QUAD, compasses=compasses_of((DEVICES[0], DEVICES[2]))),
+    replace(QUAD, uid="270051001551353337393732"),
+    replace(QUAD, uid="", board="board 9"),
 ]
 
 
@@ -132,8 +135,14 @@ def test_another_vehicle_is_refused_with_both_named(owner: Vehicle) -> None:
     with pytest.raises(VehicleRefusedError) as refused:
         plan(HELD, wanted, QUAD)
     devices = ", ".join(map(str, owner.device_ids))
-    assert f"{owner.autopilot} system {owner.system} with compasses {devices}" in str(refused.value)
-    assert "ardupilot system 1 with compasses 97539, 131874, 263178" in str(refused.value)
+    named = f"{owner.autopilot} system {owner.system} with compasses {devices}, {owner.board}"
+    assert named in str(refused.value)
+    if owner.uid:
+        assert f"flight controller {owner.uid}" in str(refused.value)
+    assert (
+        "ardupilot system 1 with compasses 97539, 131874, 263178, board 140 and flight controller "
+        "270051001551353337393731"
+    ) in str(refused.value)
 
 
 @pytest.mark.parametrize("owner", STRANGERS)
@@ -151,14 +160,25 @@ def test_a_set_without_owner_is_refused_unless_it_holds_device_ids() -> None:
     with pytest.raises(VehicleRefusedError, match="must say which vehicle they belong to"):
         plan(HELD, wanting(None, COMPASS_MOT_X=5.0), QUAD)
     dump = {"COMPASS_DEV_ID": DEVICES[0], "COMPASS_DEV_ID2": DEVICES[1], "COMPASS_MOT_X": 5.0}
-    assert plan(HELD, wanting(None, **dump), QUAD).warnings == ()
+    (warning,) = plan(HELD, wanting(None, **dump), QUAD).warnings
+    assert "The parameters give no number of the flight controller" in warning
     with pytest.raises(VehicleRefusedError, match="the vehicle must be compasses 5"):
         plan(HELD, wanting(None, **{**dump, "COMPASS_DEV_ID": 5.0}), QUAD)
 
 
 def test_a_set_without_device_ids_is_warned_about() -> None:
-    owner = replace(QUAD, compasses=())
+    owner = replace(QUAD, compasses=(), uid="")
     assert "name no compass" in plan(HELD, wanting(owner, COMPASS_MOT_X=5.0), QUAD).warnings[0]
+
+
+def test_a_vehicle_without_number_is_warned_about() -> None:
+    (warning,) = plan(HELD, wanting(COMPASS_MOT_X=5.0), replace(QUAD, uid="")).warnings
+    assert "The vehicle gives no number of the flight controller" in warning
+
+
+def test_a_board_that_only_its_firmware_names_is_not_compared() -> None:
+    owner = replace(QUAD, board="CUBEPILOT_CUBEORANGE")
+    assert plan(HELD, wanting(owner, COMPASS_MOT_X=5.0), QUAD).warnings == ()
 
 
 @pytest.mark.parametrize("autopilot", ["ardupilot", "px4"])

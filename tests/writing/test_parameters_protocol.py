@@ -14,6 +14,7 @@ from fake_autopilot import (
     OLD,
     QUAD,
     SYSTEM,
+    UID,
     WANTED,
     FakeAutopilot,
     FakeLink,
@@ -46,6 +47,7 @@ from magcomp.writing.events import (
     Written,
 )
 from magcomp.writing.messages import (
+    AskOwnNumber,
     BootTime,
     Heard,
     Heartbeat,
@@ -242,6 +244,30 @@ def test_another_vehicle_after_a_gap_gets_no_write(rig: Rig) -> None:
     assert set(rig.autopilot.writes) <= {("COMPASS_MOTCT", 0.0)} | set(NEW.items())
 
 
+def test_a_twin_that_takes_the_vehicles_place_gets_no_write(rig: Rig) -> None:
+    """Everything is alike but the flight controller's own number."""
+
+    def swap(number: int) -> None:
+        if len(rig.autopilot.writes) == 10 and rig.autopilot.uid == UID:
+            rig.autopilot.reboot(rig.clock.now)
+            rig.autopilot.uid = UID[::-1]
+            rig.autopilot.values.update(OLD)
+            rig.autopilot.writes.clear()
+
+    rig.link.before_message = swap
+    outcome = rig.write()
+    assert outcome.reason is Reason.ANOTHER_VEHICLE
+    assert f"must be {UID.hex()}; instead it is {UID[::-1].hex()}" in outcome.why
+    assert set(rig.autopilot.writes) <= {("COMPASS_MOTCT", 0.0)} | set(NEW.items())
+
+
+def test_a_twin_that_was_exchanged_before_the_write_is_not_touched(rig: Rig) -> None:
+    rig.autopilot.uid = UID[::-1]
+    outcome = rig.write()
+    assert (outcome.reason, outcome.standing) == (Reason.ANOTHER_VEHICLE, Standing.OLD)
+    assert rig.autopilot.writes == []
+
+
 def test_a_reboot_verifies_everything_anew(rig: Rig) -> None:
     def reboot(number: int) -> None:
         if len(rig.autopilot.writes) == 20 and not rig.autopilot.booted_at:
@@ -364,7 +390,7 @@ incoming = st.one_of(
     st.builds(Heartbeat, st.sampled_from([False, False, False, True])),
     st.builds(BootTime, st.floats(0, 5000)),
     st.builds(Pong, st.integers(0, 10**12), st.floats(0, 5000)),
-    st.builds(OwnNumber, st.sampled_from(["", "0a0b"])),
+    st.builds(OwnNumber, st.sampled_from(["", "0a0b", QUAD.uid])),
     st.just(Heard()),
 )
 
@@ -432,6 +458,8 @@ def test_not_even_with_a_vehicle_that_answers_now_and_then(
                 held[sent.name] = sent.value
             if isinstance(sent, Ping):
                 driver.sequence.handle(Pong(sent.token, driver.now), driver.now)
+            elif isinstance(sent, AskOwnNumber):
+                driver.sequence.handle(OwnNumber(QUAD.uid), driver.now)
             else:
                 driver.sequence.handle(ParamValue(sent.name, held[sent.name]), driver.now)
         driver.step(Heartbeat(False), wait)

@@ -13,6 +13,7 @@ from magcomp.sources.dataflash.table import Table, Tables
 
 _COLUMNS = """
     MAG MAG2 MAG3 BAT BAT2 CURR CUR2 CTUN THR RCOU RCO2 RCO3
+    ESC ESC1 ESC2 ESC3 ESC4 ESC5 ESC6 ESC7 ESC8
     ATT XKF1 XKF4 XKF6 NKF1 NKF4 NKF6 AHR2 IMU GPS POS ORGN
     PARM VER MSG EV ARM STAT
 """
@@ -25,6 +26,7 @@ _OFFSETS = (("OfsX", "OfsY", "OfsZ"),)
 _MOTORS = (("MOX", "MOY", "MOZ"), ("MOfsX", "MOfsY", "MOfsZ"))
 _INSTANCES = ("I", "Instance", "Inst")
 _BATTERIES = (("BAT", 0), ("CURR", 0), ("BAT2", 1), ("CUR2", 1))
+_ESCS = ("ESC", *(f"ESC{number}" for number in range(1, 9)))
 _OUTPUTS = (("RCOU", 0), ("RCO2", 14), ("RCO3", 18))
 _OUTPUT_NAMES = ("C", "Chan", "Ch")
 _MOST_OUTPUTS = 32
@@ -32,6 +34,7 @@ _FEWEST_OUTPUTS = 16
 _FIX_3D = 3
 _ARMED, _DISARMED = 10, 11
 _CENTI = 1e-2
+_MOST_OF_A_BATTERY = 1e4
 _SATELLITE_EPOCH_S = 315964800
 _SATELLITE_LEAP_S = 18
 _WEEK_S = 604800
@@ -79,7 +82,7 @@ def compasses(log: Log) -> dict[int, Readings]:
                     None if offset is None else offset[kept],
                     None if motor is None else motor[kept],
                 )
-    return {number: each for number, each in sorted(found.items()) if number > 0}
+    return {number: found[number] for number in range(1, len(_COMPASSES) + 1) if number in found}
 
 
 def _instances(table: Table, otherwise: int) -> list[tuple[int, NDArray[np.bool_]]]:
@@ -105,12 +108,32 @@ def batteries(log: Log) -> tuple[dict[int, Series], dict[int, Series]]:
             if column not in table.names:
                 continue
             value = table.numbers(column) * (1.0 if table.is_float(column) else _CENTI)
-            sound = np.isfinite(value)
+            # NaN fails.
+            sound = np.abs(value) < _MOST_OF_A_BATTERY
             for each, rows in instances:
                 series = _series(time, value, rows & sound) if each not in into else None
                 if series is not None:
                     into[each] = series
     return current, voltage
+
+
+def esc_current(log: Log) -> Series | None:
+    """Sum of the speed controllers' currents, A, at the times of the one that reports first."""
+    found: list[Series] = []
+    for name in _ESCS:
+        got = log.get(name)
+        if got is None or "Curr" not in got[1].names:
+            continue
+        time, table = got
+        value = table.numbers("Curr") * (1.0 if table.is_float("Curr") else _CENTI)
+        sound = np.abs(value) < _MOST_OF_A_BATTERY
+        each = (_series(time, value, rows & sound) for _, rows in _instances(table, 0))
+        found.extend(series for series in each if series is not None)
+    if not found:
+        return None
+    at = found[0].time
+    total = sum((np.interp(at, each.time, each.value) for each in found), np.zeros(len(at)))
+    return Series(at, total)
 
 
 def throttle(log: Log, kind: str) -> Series | None:
