@@ -11,7 +11,6 @@ does not bias a slope the way an error of interpolation does.
 from __future__ import annotations
 
 import numpy as np
-from scipy.signal import lfilter
 
 from magcomp import autopilots
 from magcomp.align.sample import interpolate
@@ -193,6 +192,9 @@ def _smoothed(series: Series, constant: float) -> Series:
     """What a first-order low pass of a time constant in seconds makes of columns, (n, k)."""
     if constant <= 0.0:
         return series
+    # SciPy's filters cost a second to import: only where there is something to fit.
+    from scipy.signal import lfilter  # noqa: PLC0415
+
     step = float(np.median(np.diff(series.time)))
     if float(np.ptp(series.time)) > _MOST_ROWS * step:
         return series
