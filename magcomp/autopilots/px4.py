@@ -124,9 +124,9 @@ class Px4:
                 )
             )
 
-    def field_meaning(self, source_format: str) -> FieldMeaning:  # noqa: ARG002
-        """Not cut: telemetry's whole mGauss are mended before they are turned."""
-        return FieldMeaning(truncated=False, applied_later_s=0.0)
+    def field_meaning(self, source_format: str) -> FieldMeaning:
+        """On the link whole mGauss, in the log floats."""
+        return FieldMeaning(truncated=source_format != "ulog", applied_later_s=0.0)
 
     def from_telemetry(
         self, told: Mapping[int, Series], values: Mapping[str, float]

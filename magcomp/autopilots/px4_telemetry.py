@@ -33,17 +33,19 @@ def by_slot(told: Mapping[int, Series], values: Mapping[str, float]) -> dict[int
         Parameters by name. The messages are taken for the slots in their order, unless the
         calibrations fit the readings clearly better in another.
     """
-    sensors = [Series(each.time, _uncut(each.value)) for _, each in sorted(told.items())]
+    sensors = [each for _, each in sorted(told.items())]
     slots = [compass.slot for compass in compasses(values)]
     found = {}
     for number, series in zip(_order(sensors, slots, values), sensors, strict=False):
         turn = sensor_to_body(values, number)
-        found[number] = Series(series.time, series.value @ turn.T)
+        whole = np.array_equal(turn, np.rint(turn))
+        value = series.value if whole else _uncut(series.value)
+        found[number] = Series(series.time, value @ turn.T)
     return dict(sorted(found.items()))
 
 
 def _uncut(value: FloatArray) -> FloatArray:
-    """Undo the mean of the cut towards zero to whole mGauss."""
+    """Undo the mean of the cut towards zero, which cannot be seen any more behind a turn."""
     return np.asarray(value + 0.5 * np.sign(value))
 
 

@@ -43,10 +43,19 @@ def test_each_message_is_taken_for_the_slot_whose_calibration_fits(order) -> Non
     assert sorted(found) == [1, 2, 4]
     assert raw == {1, 2, 4}
     for number, field in found.items():
-        strength = np.linalg.norm(corrected(number, field), axis=1)
-        # What is left is the cut to whole mGauss, with its mean undone.
+        cut = Series(field.time, field.value + 0.5 * np.sign(field.value))
+        strength = np.linalg.norm(corrected(number, cut), axis=1)
         assert strength == pytest.approx(480.0, abs=1.5)
         assert np.mean(strength) == pytest.approx(480.0, abs=0.1)
+
+
+def test_whole_numbers_are_mended_before_a_turn_hides_them() -> None:
+    told = {1: Series(np.zeros(1), np.array([[100.0, -50.0, 30.0]]))}
+    (whole, turned) = (
+        PX4.from_telemetry(told, held(1, CAL_MAG0_ROT=float(rot)))[0][1].value[0] for rot in (2, 1)
+    )
+    assert whole.tolist() == [50.0, 100.0, 30.0]
+    assert turned == pytest.approx([151.0 / 2**0.5, 50.0 / 2**0.5, 30.5])
 
 
 def test_too_few_readings_are_taken_in_the_order_of_the_slots() -> None:
