@@ -17,6 +17,7 @@ from magcomp.align.sample import interpolate
 from magcomp.autopilots.protocol import MotorOutputs
 from magcomp.model import (
     CURRENT,
+    SPEED_CONTROLLERS,
     THROTTLE,
     Control,
     FloatArray,
@@ -28,6 +29,13 @@ _SHIFTS = np.arange(-0.2, 0.301, 0.02)
 _TREND_S = 5.0
 _LEAST_ROWS = 30
 _LEAST_EXPLAINED = 0.8
+_FINER = 4.0
+_CUT_SHARE = 0.1
+_SMOOTHINGS = (0.03, 0.06, 0.1, 0.15, 0.2, 0.3)
+"""Time constants in seconds by which a battery monitor may smooth."""
+_STEPS_SEEN = 1.5
+_MOST_ROWS = 1_000_000
+"""More rows in even steps than this mean that the times are not to be trusted."""
 
 
 def controls(recording: Recording) -> tuple[Control, ...]:
@@ -43,9 +51,12 @@ def controls(recording: Recording) -> tuple[Control, ...]:
     motors = _motors(recording)
     duty = _duty(recording.outputs, motors)
     if recording.current is not None and _varies(recording.current):
-        found.append(Control(CURRENT, recording.current, "battery current"))
-        if duty is not None:
-            found.extend(_rebuilt(recording.current, duty, CURRENT, "battery current"))
+        of_escs = recording.battery == SPEED_CONTROLLERS
+        name = "the speed controllers' current" if of_escs else "battery current"
+        found.append(Control(CURRENT, recording.current, name))
+        for features, source in _finer(recording, duty):
+            whole = f"{name}, rebuilt from the {source}"
+            found.extend(_rebuilt(recording.current, features, CURRENT, whole))
     if recording.throttle is not None and _varies(recording.throttle):
         throttle = Series(recording.throttle.time, _mend_percent(recording.throttle.value))
         found.append(Control(THROTTLE, throttle, "reported throttle"))
@@ -57,7 +68,8 @@ def controls(recording: Recording) -> tuple[Control, ...]:
                     Control(THROTTLE, thrust, "motor outputs through the autopilot's thrust curve")
                 )
             else:
-                found.extend(_rebuilt(throttle, duty, THROTTLE, "reported throttle"))
+                name = "reported throttle, rebuilt from the motor outputs"
+                found.extend(_rebuilt(throttle, duty, THROTTLE, name))
     return tuple(found)
 
 
@@ -115,23 +127,83 @@ def _explains(thrust: Series, throttle: Series) -> bool:
     return bool(np.mean(inside) > 0.8)
 
 
+def _finer(recording: Recording, duty: Series | None) -> list[tuple[Series, str]]:
+    """What the current can be rebuilt from, shape (n, k) each, and what it is in words.
+
+    A throttle cut to whole per cent, or told no more often than the current, is no help.
+    """
+    found = [] if duty is None else [(duty, "motor outputs")]
+    current, throttle = recording.current, recording.throttle
+    if current is None or throttle is None or len(throttle) < _LEAST_ROWS:
+        return found
+    cut = float(np.mean(_mend_percent(throttle.value) != throttle.value)) > _CUT_SHARE
+    often = float(np.median(np.diff(throttle.time))) * _FINER < float(
+        np.median(np.diff(current.time))
+    )
+    if often and not cut:
+        found.append((Series(throttle.time, throttle.value[:, None]), "throttle"))
+    return found
+
+
 def _rebuilt(reference: Series, duty: Series, kind: str, name: str) -> list[Control]:
-    """The reference regressed on powers of the duty, where the duty is sampled more often."""
+    """The reference regressed on powers of the duty, shape (n, k), sampled more often.
+
+    A battery monitor smooths what it measures. Where the duty is told often enough to see that,
+    the quantity before it was smoothed is a form of its own: a shift in time is not all that lies
+    between the two, and a slope against the smoothed one comes out too large.
+    """
     if len(reference) < _LEAST_ROWS:
         return []
     powers = np.stack([np.mean(duty.value**k, axis=1) for k in (1, 2, 3)], axis=1)
-    features = Series(duty.time, powers)
-    fits = [_regress(reference, features, shift) for shift in _SHIFTS]
+    found = [_rebuilt_through(reference, Series(duty.time, powers), 0.0, kind, name)]
+    step = float(np.median(np.diff(duty.time)))
+    smoothings = [each for each in _SMOOTHINGS if each > _STEPS_SEEN * step > 0.0]
+    if smoothings and found[0] is not None:
+        whole = f"{name} as before its smoothing"
+        forms = [
+            _rebuilt_through(reference, Series(duty.time, powers), each, kind, whole)
+            for each in smoothings
+        ]
+        better = [form for form in forms if form is not None and form[1] < found[0][1]]
+        found.append(min(better, key=lambda form: form[1], default=None))
+    return [form[0] for form in found if form is not None]
+
+
+def _rebuilt_through(
+    reference: Series, features: Series, smoothing: float, kind: str, name: str
+) -> tuple[Control, float] | None:
+    """The quantity of which the reference is the smoothed one, and the mean square it leaves."""
+    seen = _smoothed(features, smoothing)
+    fits = [_regress(reference, seen, shift) for shift in _SHIFTS]
     best = min(range(len(fits)), key=lambda k: fits[k][1])
     coefficients, cost = fits[best]
     if not cost < (1 - _LEAST_EXPLAINED) * float(np.var(reference.value)):
-        return []
-    modelled = coefficients[0] + powers @ coefficients[1:]
-    series = Series(duty.time + _SHIFTS[best], modelled)
-    left = reference.value - interpolate(series, reference.time)
+        return None
+    time = features.time + _SHIFTS[best]
+    as_reported = Series(time, coefficients[0] + seen.value @ coefficients[1:])
+    left = reference.value - interpolate(as_reported, reference.time)
     trend = _running_mean(Series(reference.time, left), _TREND_S)
-    value = np.maximum(modelled + interpolate(trend, series.time), 0.0)
-    return [Control(kind, Series(series.time, value), f"{name}, rebuilt from the motor outputs")]
+    modelled = coefficients[0] + features.value @ coefficients[1:]
+    value = np.maximum(modelled + interpolate(trend, time), 0.0)
+    return Control(kind, Series(time, value), name), cost
+
+
+def _smoothed(series: Series, constant: float) -> Series:
+    """What a first-order low pass of a time constant in seconds makes of columns, (n, k)."""
+    if constant <= 0.0:
+        return series
+    # SciPy's filters cost a second to import: only where there is something to fit.
+    from scipy.signal import lfilter  # noqa: PLC0415
+
+    step = float(np.median(np.diff(series.time)))
+    if float(np.ptp(series.time)) > _MOST_ROWS * step:
+        return series
+    time = np.arange(series.time[0], series.time[-1] + step, step)
+    even = interpolate(series, time)
+    share = 1.0 - float(np.exp(-step / constant))
+    start = (1.0 - share) * even[:1]
+    smooth, _ = lfilter([share], [1.0, share - 1.0], even, axis=0, zi=start)
+    return Series(series.time, interpolate(Series(time, smooth), series.time))
 
 
 def _regress(reference: Series, features: Series, shift: float) -> tuple[FloatArray, float]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from magcomp import autopilots
 from magcomp.align.sample import interpolate
 from magcomp.earth import EarthField, expected_field
 from magcomp.errors import MissingDataError
@@ -29,11 +30,15 @@ def expected_earth(recording: Recording) -> EarthField:
         raise MissingDataError(
             f"{recording.source} must hold a compass and the attitude; instead one is missing"
         )
-    first = recording.field[min(recording.field)]
-    attitude = interpolate(recording.attitude, first.time)
+    compass = min(recording.field)
+    time, value = recording.field[compass].time, recording.field[compass].value
+    if compass in recording.raw_compasses:
+        present = autopilots.of(recording).in_force(recording.parameters.latest, compass)
+        value = present.correction.apply(value, np.zeros(len(value)))
+    attitude = interpolate(recording.attitude, time)
     down = gravity_direction(attitude[:, 0], attitude[:, 1])
-    strength = float(np.median(np.linalg.norm(first.value, axis=1)))
-    vertical = float(np.median(np.einsum("ij,ij->i", first.value, down)))
+    strength = float(np.median(np.linalg.norm(value, axis=1)))
+    vertical = float(np.median(np.einsum("ij,ij->i", value, down)))
     return EarthField(strength, float(np.arcsin(np.clip(vertical / strength, -1.0, 1.0))), 0.0)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from magcomp import autopilots
 from magcomp.align import controls, expected_earth, has_position, readings, reported
 from magcomp.align.health import compass_complaints, current_complaints
+from magcomp.analysis.choose import with_speed_controllers
 from magcomp.analysis.emit import Emission, emit
 from magcomp.analysis.multiplied import kinds_to_try, multiplied_notes, why_only_to_look_at
 from magcomp.analysis.vehicle_words import in_words_of
@@ -29,7 +30,8 @@ from magcomp.model import (
     Verdict,
 )
 
-REGRESSORS = ("auto", CURRENT, THROTTLE, "motors")
+ESC = "esc"
+REGRESSORS = ("auto", CURRENT, THROTTLE, "motors", ESC)
 
 BETTER = 0.97
 """Throttle is written instead of current only where it leaves less than this share unexplained:
@@ -106,19 +108,29 @@ def analyse(
         Where every compass asked for has a parameter that is not finite.
     """
     wanted = Options() if options is None else options
+    if wanted.regressor == ESC:
+        recording = with_speed_controllers(recording)
+        wanted = replace(wanted, regressor=CURRENT)
     compasses = _compasses(recording, wanted)
     found = _controls_of(recording)
     kinds = _kinds(recording, found, wanted)
     earth = expected_earth(recording)
     steps = len(kinds) * len(compasses)
     judged: dict[str, list[_Judged]] = {}
+    lacking: dict[int, MissingDataError] = {}
     for kind in kinds:
         forms = [control for control in found if control.kind == kind]
         for compass in compasses:
             progress(f"compass {compass} by {kind}", sum(map(len, judged.values())) / steps)
-            result = _one(recording, compass, wanted, forms, reported(found), earth)
+            try:
+                result = _one(recording, compass, wanted, forms, reported(found), earth)
+            except MissingDataError as error:
+                lacking.setdefault(compass, error)
+                continue
             forms = [result.problem.control]
             judged.setdefault(kind, []).append(result)
+    if not judged:
+        raise _with_cure(recording, compasses[0], lacking[compasses[0]])
     progress("done", 1.0)
     chosen = _choose(judged)
     emitted = emit(recording, [j.fit for j in judged[chosen]])
@@ -136,7 +148,7 @@ def analyse(
             )
             for j in judged[chosen]
         ),
-        notes=tuple(_notes(recording, wanted, judged, chosen)),
+        notes=(*_notes(recording, wanted, judged, chosen), *_lacking_notes(lacking, judged)),
         only_to_look_at=why_not,
     )
 
@@ -292,6 +304,22 @@ def _choose(judged: Mapping[str, list[_Judged]]) -> str:
     return THROTTLE if unexplained(THROTTLE) < BETTER * unexplained(CURRENT) else CURRENT
 
 
+def _with_cure(recording: Recording, compass: int, lacking: MissingDataError) -> MissingDataError:
+    if compass not in recording.field:
+        return lacking
+    how = autopilots.of(recording).how_to_record("more readings", recording.format)
+    return MissingDataError(f"{lacking}: {how}")
+
+
+def _lacking_notes(
+    lacking: Mapping[int, MissingDataError], judged: Mapping[str, list[_Judged]]
+) -> Iterable[str]:
+    done = {j.fit.compass for results in judged.values() for j in results}
+    for compass, why in sorted(lacking.items()):
+        if compass not in done:
+            yield f"compass {compass} is left out: {why}"
+
+
 def _notes(
     recording: Recording, wanted: Options, judged: Mapping[str, list[_Judged]], chosen: str
 ) -> Iterable[str]:
@@ -318,6 +346,7 @@ def _notes(
             "the log holds no parameters: the calibration in force is unknown, so only the motor "
             "vector is given, and it is right only if no motor compensation was in force"
         )
+    yield from recording.report.notes
     others = recording.report.others
     if others:
         named = ", ".join(f"{system}:{component}" for system, component in others)

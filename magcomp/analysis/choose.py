@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from magcomp.errors import MissingDataError
-from magcomp.model import Recording
+from magcomp.model import SPEED_CONTROLLERS, Recording
 
 
 def with_battery(recording: Recording, number: int) -> Recording:
@@ -37,6 +37,32 @@ def with_battery(recording: Recording, number: int) -> Recording:
     if recording.current is not None:
         others[recording.battery] = recording.current
     return replace(recording, current=current, voltage=None, battery=number, other_currents=others)
+
+
+def with_speed_controllers(recording: Recording) -> Recording:
+    """The same recording with the current of the speed controllers in front.
+
+    Raises
+    ------
+    MissingDataError
+        Where they report none.
+    """
+    current = recording.esc_current
+    if current is None:
+        raise MissingDataError(
+            f"{recording.source} must hold the current of speed controllers; instead it holds none"
+        )
+    others = dict(recording.other_currents)
+    if recording.current is not None:
+        others[recording.battery] = recording.current
+    return replace(
+        recording,
+        current=current,
+        voltage=None,
+        battery=SPEED_CONTROLLERS,
+        other_currents=others,
+        esc_current=None,
+    )
 
 
 def with_attitude(recording: Recording, source: str) -> Recording:

@@ -175,6 +175,8 @@ def _quantities(recording: Recording) -> Iterator[Quantity]:
         yield _ranged(f"battery {recording.battery}", "A", recording.current)
     for number, current in sorted(recording.other_currents.items()):
         yield _ranged(f"battery {number}", "A", current, used=False)
+    if recording.esc_current is not None:
+        yield _ranged("speed controllers", "A", recording.esc_current, used=False)
     if recording.throttle is not None:
         percent = Series(recording.throttle.time, 100.0 * recording.throttle.value)
         yield _ranged("throttle", "%", percent)

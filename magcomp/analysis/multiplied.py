@@ -8,7 +8,7 @@ import numpy as np
 
 from magcomp import autopilots
 from magcomp.errors import MissingDataError
-from magcomp.model import CURRENT, FloatArray, Recording, Series
+from magcomp.model import CURRENT, SPEED_CONTROLLERS, FloatArray, Recording, Series
 
 _LEAST_SHARE = 0.1
 _LEAST_CORRELATION = 0.8
@@ -46,9 +46,12 @@ def why_only_to_look_at(recording: Recording, kind: str) -> str:
         )
     if kind == CURRENT and recording.battery not in autopilot.batteries:
         numbers = " or ".join(map(str, autopilot.batteries))
+        whose = f"battery {recording.battery}"
+        if recording.battery == SPEED_CONTROLLERS:
+            whose = "the speed controllers"
         return (
             f"{autopilot.title} multiplies only the current of battery {numbers}: a fit by that of "
-            f"battery {recording.battery} is to look at, and cannot be written"
+            f"{whose} is to look at, and cannot be written"
         )
     return ""
 

@@ -80,6 +80,7 @@ _ALL_CURRENTS = (
 )
 _LOG_BITS = {
     "compass": "set the COMPASS bit of LOG_BITMASK and COMPASS_ENABLE to 1, and record again",
+    "more readings": "record longer",
     "control": (
         "set the CURRENT and CTUN bits of LOG_BITMASK and give the log as the vehicle wrote it"
     ),
@@ -91,6 +92,7 @@ _LOG_BITS = {
 }
 _LINK_MESSAGES = {
     "compass": "ask for RAW_IMU, SCALED_IMU2 or SCALED_IMU3 at 10 Hz, with COMPASS_ENABLE 1",
+    "more readings": "record longer, or ask for RAW_IMU, SCALED_IMU2 or SCALED_IMU3 at 10 Hz",
     "control": "was the vehicle ever armed, and does the link carry BATTERY_STATUS or VFR_HUD?",
     "current": "set up a current sensor (BATT_MONITOR) and ask for BATTERY_STATUS at 10 Hz",
     "all currents": _ALL_CURRENTS,

@@ -377,8 +377,9 @@ class Autopilot(Protocol):
         Parameters
         ----------
         quantity
-            ``"compass"``, ``"control"`` (current and throttle), ``"current"``, ``"all currents"``
-            (of several batteries as one), ``"attitude"``, ``"parameters"`` or ``"position"``.
+            ``"compass"``, ``"more readings"`` (of it), ``"control"`` (current and throttle),
+            ``"current"``, ``"all currents"`` (of several batteries as one), ``"attitude"``,
+            ``"parameters"`` or ``"position"``.
         source_format
             As in ``Recording.format``.
         """

@@ -64,6 +64,30 @@ _LOGGED = LagPriors(LagPrior(0.0, 0.05), LagPrior(0.0, 0.1))
 """A log stamps a reading with the moment of measurement."""
 _LINK = LagPriors(LagPrior(0.0, 0.1), LagPrior(0.0, 0.1))
 
+_ALL_CURRENTS = "fit by throttle, or let one sensor measure what all the motors draw"
+_USUAL_TOPICS = "set SDLOG_PROFILE to 65 (the usual topics, and each compass at 10 Hz)"
+_LOG_BITS = {
+    "compass": f"{_USUAL_TOPICS}, and fly again",
+    "more readings": f"fly longer, or {_USUAL_TOPICS}",
+    "control": f"{_USUAL_TOPICS}, and fly again",
+    "current": f"set up a current sensor, {_USUAL_TOPICS}, and fly again",
+    "all currents": _ALL_CURRENTS,
+    "attitude": f"{_USUAL_TOPICS}, and fly again",
+    "parameters": "give the whole log, which has them at its beginning",
+    "position": "fly where satellites are seen",
+}
+_OWN_LOG = "give the vehicle's own log of the same flight (.ulg)"
+_LINK_MESSAGES = {
+    "compass": f"{_OWN_LOG}, or ask for SCALED_IMU, SCALED_IMU2 and SCALED_IMU3 at 10 Hz",
+    "more readings": f"{_OWN_LOG}, or ask for SCALED_IMU, SCALED_IMU2 and SCALED_IMU3 at 10 Hz",
+    "control": f"{_OWN_LOG}, or ask for BATTERY_STATUS and VFR_HUD at 10 Hz",
+    "current": f"{_OWN_LOG}, or set up a current sensor and ask for BATTERY_STATUS at 10 Hz",
+    "all currents": _ALL_CURRENTS,
+    "attitude": f"{_OWN_LOG}, or ask for ATTITUDE at 20 Hz",
+    "parameters": f"{_OWN_LOG}, or let the ground station read all parameters while it records",
+    "position": "ask for GLOBAL_POSITION_INT, and fly where satellites are seen",
+}
+
 
 class Px4:
     """See :class:`magcomp.autopilots.protocol.Autopilot`."""
@@ -243,9 +267,10 @@ class Px4:
         """Thrust and current, whatever the vehicle."""
         return (CURRENT, THROTTLE)
 
-    def how_to_record(self, quantity: str, source_format: str) -> str:  # noqa: ARG002
-        """A bit of SDLOG_PROFILE."""
-        return f"set SDLOG_PROFILE to 1, which logs the {quantity}, and fly again"
+    def how_to_record(self, quantity: str, source_format: str) -> str:
+        """A bit of SDLOG_PROFILE; telemetry as it is sends too little of everything."""
+        asked = _LOG_BITS if source_format == "ulog" else _LINK_MESSAGES
+        return asked[quantity]
 
     def no_compass_hint(self) -> str:
         """Telemetry sends no compass by itself."""

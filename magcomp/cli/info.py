@@ -54,6 +54,7 @@ def _document(recording: Recording, found: Contents) -> dict[str, Any]:
             "bad_checksum": report.bad_checksum,
             "duplicates": report.duplicates,
         },
+        "notes": list(report.notes),
         "can_be_fitted": found.can_be_fitted,
         "missing": [asdict(each) for each in found.missing],
     }
@@ -81,6 +82,8 @@ def _lines(recording: Recording, found: Contents, columns: int) -> Iterator[str]
     board = f", {vehicle.board}" if vehicle.board else ""
     yield f" {words.duration(recording.duration_s)} of {words.vehicle(vehicle)}{board}"
     yield f" {_began(recording.start_unix_s)}, {_parameters(recording, found)}"
+    if recording.report.skipped:
+        yield f" {recording.report.skipped} bytes of {recording.report.size} belong to no message"
     if found.armed_s is not None:
         yield f" armed for {words.duration(found.armed_s)}"
     if found.compasses:
@@ -141,6 +144,8 @@ def _verdict(recording: Recording, found: Contents, columns: int) -> Iterator[st
         if compass.left_out:
             why = words.sentence(f"compass {compass.number} is left out: {compass.left_out}")
             yield from _wrapped(why, columns)
+    for note in recording.report.notes:
+        yield from _wrapped(words.sentence(note), columns)
     log = words.printable(recording.source)
     if not found.missing:
         yield f" Nothing is missing. To fit it: magcomp fit {log}"

@@ -72,7 +72,10 @@ class LiveSnapshot:
     armed
         None before the first heartbeat.
     elapsed_s
-        Seconds since the first frame.
+        Seconds since the session was opened.
+    recorded_s
+        Seconds of the vehicle's own clock in which attitudes came: it stands while the link is
+        lost.
     recording_path, recording_bytes
         The .tlog being written; None and 0 without one.
     recording
@@ -119,6 +122,7 @@ class LiveSnapshot:
     link_text: str
     armed: bool | None
     elapsed_s: float
+    recorded_s: float
     recording_path: Path | None
     recording_bytes: int
     recording: bool

@@ -12,7 +12,6 @@ from magcomp.errors import unforeseen
 from magcomp.link import (
     Connection,
     GapEnded,
-    GapStarted,
     LinkEvent,
     Replay,
     SinkFailed,
@@ -37,6 +36,8 @@ from magcomp.live.tap import Tap
 from magcomp.model import Analysis, Grade, Vehicle
 
 LOOK_S = 0.2
+_GAP_TOLD_S = 20.0
+"""How long a pilot is told of a gap that is over."""
 _NOTHING = Now(0, None, {}, (), None, None, None, None, None, None, False)
 
 
@@ -69,6 +70,7 @@ class Watch:
         self._opened = clock.monotonic()
         self._situation = SituationWatch()
         self._notes: list[str] = []
+        self._gap = (-math.inf, "")
 
     def run(self, stop: threading.Event) -> None:
         """Watch until stopped; what goes wrong in one look is told, and the next one follows."""
@@ -112,6 +114,7 @@ class Watch:
             link_text=self._link_text(vehicle, link.up),
             armed=now.armed,
             elapsed_s=self.elapsed_s,
+            recorded_s=self._tap.seconds,
             recording_path=self._tap.path,
             recording_bytes=self._tap.size,
             recording=self._tap.taking and not self._tap.failure,
@@ -139,10 +142,8 @@ class Watch:
 
     def _take(self, event: LinkEvent) -> None:
         match event:
-            case GapStarted():
-                self._note("the link was lost")
             case GapEnded(duration=duration):
-                self._note(f"the link was gone for {duration:.0f} s")
+                self._gap = (self._clock.monotonic(), f"the link was gone for {duration:.0f} s")
             case VehicleRebooted():
                 self._note("the vehicle rebooted")
             case VehicleFound():
@@ -194,6 +195,9 @@ class Watch:
         since = self._preparation.streaming_since
         streaming = 0.0 if since is None else self._clock.monotonic() - since
         found = [*warnings(now, vehicle, parameters, streaming), *reversed(self._notes)]
+        ended, gap = self._gap
+        if self._clock.monotonic() - ended < _GAP_TOLD_S:
+            found.append(gap)
         if self._preparation.failure is not None:
             found.insert(0, str(self._preparation.failure).rstrip("."))
         if self._tap.failure:

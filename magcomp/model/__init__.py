@@ -24,6 +24,7 @@ from magcomp.model.fit import (
 )
 from magcomp.model.parameters import ParameterSet
 from magcomp.model.recording import (
+    SPEED_CONTROLLERS,
     Applied,
     BoolArray,
     Compass,
@@ -55,6 +56,7 @@ __all__ = [
     "MOTOR",
     "OFFSET",
     "SOFT_IRON",
+    "SPEED_CONTROLLERS",
     "THROTTLE",
     "UNITS",
     "Analysis",

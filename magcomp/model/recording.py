@@ -21,6 +21,10 @@ BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.intp]
 
 
+SPEED_CONTROLLERS = -1
+"""In place of a battery's number: the speed controllers together."""
+
+
 @dataclass(frozen=True, eq=False)
 class Series:
     """A quantity against time.
@@ -131,6 +135,8 @@ class ReadReport:
         Frames dropped because the same frame stood in the log before.
     others
         (system, component) pairs whose messages were left out.
+    notes
+        What else a user should know, a sentence each without its full stop.
     """
 
     size: int
@@ -140,6 +146,7 @@ class ReadReport:
     skipped: int = 0
     duplicates: int = 0
     others: tuple[tuple[int, int], ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 class ParameterChange(NamedTuple):
@@ -261,7 +268,8 @@ class Recording:
         What it was read from: ``"tlog"``, ``"live"``, ``"dataflash"`` or ``"ulog"``. How late a
         quantity is depends on it.
     battery
-        Battery instance that ``current`` and ``voltage`` are of.
+        Battery instance that ``current`` and ``voltage`` are of; ``SPEED_CONTROLLERS`` where the
+        current is the sum of theirs.
     other_currents
         Instance of each other battery to its current in A.
     applied
@@ -273,6 +281,8 @@ class Recording:
         Message that ``attitude`` is from; empty where there is none.
     other_attitudes
         Messages that tell the attitude too, the better ones first, to what they tell.
+    esc_current
+        Sum of the speed controllers' currents in A, shape (n,), where they report any.
     """
 
     source: str
@@ -298,3 +308,4 @@ class Recording:
     raw_compasses: frozenset[int] = frozenset()
     attitude_source: str = ""
     other_attitudes: Mapping[str, Series] = dataclasses.field(default_factory=dict)
+    esc_current: Series | None = None

@@ -14,6 +14,7 @@ from magcomp.mavlink.heartbeat import KINDS
 from magcomp.mavlink.version import firmware_version, unique_id
 from magcomp.model import ParameterChange, ParameterHistory, ReadReport, Recording, Vehicle
 from magcomp.sources.source import mapped
+from magcomp.sources.ulog_compasses import Compasses
 from magcomp.sources.ulog_file import MICROSECOND, UlogFile, read_ulog_file
 from magcomp.sources.ulog_quantities import Quantities
 
@@ -63,7 +64,8 @@ def read_ulog(path: str | Path) -> Recording:
     -------
     Recording
         Compass n + 1 is that of the calibration slot n, whichever topic instance it has.
-        ``raw_compasses`` names those whose field is the sensor's own, turned into body axes.
+        ``raw_compasses`` names those whose field is the sensor's own, turned into body axes; that
+        of the others is the corrected one.
 
     Raises
     ------
@@ -78,13 +80,14 @@ def read_ulog(path: str | Path) -> Recording:
             f"Log {path} must hold messages of a vehicle; instead received a PX4 log without one "
             "of those needed: was logging stopped at once?"
         )
-    zero = min(int(topic.columns["timestamp"][0]) for topic in log.topics.values())
+    zero = min(log.start, *(int(topic.columns["timestamp"][0]) for topic in log.topics.values()))
     last = max(int(topic.columns["timestamp"][-1]) for topic in log.topics.values())
     parameters = _parameters(log, zero)
     values = parameters.latest
     version = firmware_version(int(log.info.get("ver_sw_release", 0)))
     quantities = Quantities(log, zero, version, values)
-    compasses = quantities.compasses()
+    armed = quantities.armed()
+    compasses = Compasses(log, zero, parameters, armed).fields()
     batteries = quantities.currents()
     battery = quantities.battery(batteries)
     return Recording(
@@ -105,7 +108,7 @@ def read_ulog(path: str | Path) -> Recording:
         voltage=quantities.voltage(battery),
         outputs=quantities.outputs(),
         position=quantities.position(),
-        armed=quantities.armed(),
+        armed=armed,
         format="ulog",
         battery=battery,
         other_currents={n: each for n, each in batteries.items() if n != battery},

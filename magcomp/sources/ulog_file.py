@@ -31,6 +31,8 @@ _READS_ALWAYS = 10_000
 """A sound file takes two reads for each message of at least 10 bytes."""
 
 _DAY_US = 86_400_000_000
+_BEFORE_US = 1_000_000
+"""Rows from further before the log say how it was, not when."""
 
 
 def _say_nothing(*_: object, **__: object) -> None:
@@ -68,13 +70,19 @@ class Topic:
         """The first fields of an array side by side, shape (n, size)."""
         return np.stack([self.number(f"{name}[{index}]") for index in range(size)], axis=1)
 
-    def stamp(self) -> NDArray[np.uint64]:
-        """When each row was measured, or else said, microseconds, shape (n,)."""
-        said = self.columns["timestamp"].astype(np.uint64)
+    def said(self, zero: int) -> FloatArray:
+        """When each row was said, seconds since ``zero`` microseconds, shape (n,)."""
+        return (self.number("timestamp") - zero) * MICROSECOND
+
+    def measured(self, zero: int) -> FloatArray:
+        """When each row was measured, or else said, seconds since ``zero``, shape (n,)."""
+        said = self.number("timestamp")
         if "timestamp_sample" not in self.columns:
-            return said
-        measured = self.columns["timestamp_sample"].astype(np.uint64)
-        return np.where(measured > 0, measured, said)
+            return (said - zero) * MICROSECOND
+        measured = self.number("timestamp_sample")
+        # What is not set is 0, and a reading does not wait for long.
+        believed = np.abs(said - measured) < _DAY_US
+        return (np.where(believed, measured, said) - zero) * MICROSECOND
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,8 +101,8 @@ class UlogFile:
         Time in microseconds, name and value of each parameter that was set later.
     messages
         Texts of the log, oldest first.
-    damaged
-        Whether bytes had to be stepped over.
+    start
+        When the log began, microseconds.
     """
 
     topics: Mapping[tuple[str, int], Topic]
@@ -102,7 +110,7 @@ class UlogFile:
     initial: Mapping[str, float]
     changed: tuple[tuple[int, str, float], ...]
     messages: tuple[str, ...]
-    damaged: bool
+    start: int
 
     def topic(self, name: str, *fields: str, instance: int = 0) -> Topic | None:
         """A topic's instance, if it came with these fields."""
@@ -167,15 +175,17 @@ def read_ulog_file(data: bytes, source: str, wanted: Collection[str]) -> UlogFil
         It cannot be taken apart.
     """
     log = _parse(data, source, list(wanted))
+    parts = _parts(log)
+    start = _start(log, parts)
     return UlogFile(
-        topics=_topics(log),
+        topics=_topics(parts, start),
         info=dict(log.msg_info_dict),
         initial={name: float(v) for name, v in log.initial_parameters.items() if _is_number(v)},
         changed=tuple(
             (int(time), name, float(v)) for time, name, v in log.changed_parameters if _is_number(v)
         ),
         messages=tuple(message.message for message in log.logged_messages),
-        damaged=bool(log.file_corruption),
+        start=start,
     )
 
 
@@ -226,24 +236,42 @@ def _is_number(value: object) -> bool:
     return isinstance(value, int | float)
 
 
-def _topics(log: Any) -> dict[tuple[str, int], Topic]:
-    """Rows in order of time, without those of another day than most."""
+def _parts(log: Any) -> dict[tuple[str, int], list[Columns]]:
+    """What came of each topic; what was appended after a crash comes apart from the rest."""
     parts: dict[tuple[str, int], list[Columns]] = {}
     for data in log.data_list:
         if "timestamp" in data.data:
-            # What was appended after a crash comes apart from the rest of its topic.
             parts.setdefault((data.name, int(data.multi_id)), []).append(data.data)
-    if not parts:
-        return {}
+    return parts
+
+
+def _start(log: Any, parts: Mapping[tuple[str, int], list[Columns]]) -> int:
+    """When the log began, as it says; the earliest row where that cannot be.
+
+    A topic that seldom changes comes first with the last message from before the log.
+    """
     stamps = [each["timestamp"] for tables in parts.values() for each in tables]
-    middle = float(np.median(np.concatenate(stamps).astype(np.float64)))
+    if not stamps:
+        return int(log.start_timestamp)
+    every = np.concatenate(stamps).astype(np.float64)
+    middle = float(np.median(every))
+    said = float(log.start_timestamp)
+    if middle - _DAY_US < said <= middle:
+        return int(said)
+    return int(every[np.abs(every - middle) < _DAY_US].min())
+
+
+def _topics(
+    parts: Mapping[tuple[str, int], list[Columns]], start: int
+) -> dict[tuple[str, int], Topic]:
+    """Rows in order of time, without those before the log and of another day."""
     found = {}
     for key, tables in parts.items():
         alike = [each for each in tables if each.keys() == tables[0].keys()]
         columns = {name: np.concatenate([each[name] for each in alike]) for name in tables[0]}
-        stamp = columns["timestamp"].astype(np.float64)
-        rows = np.flatnonzero(np.abs(stamp - middle) < _DAY_US)
-        rows = rows[np.argsort(stamp[rows], kind="stable")]
+        since = columns["timestamp"].astype(np.float64) - start
+        rows = np.flatnonzero((since > -_BEFORE_US) & (since < _DAY_US))
+        rows = rows[np.argsort(since[rows], kind="stable")]
         if len(rows):
             found[key] = Topic({name: values[rows] for name, values in columns.items()})
     return found

@@ -5,14 +5,10 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from magcomp.autopilots.px4_correction import MGAUSS, Compensation, stored
-from magcomp.autopilots.px4_rotation import sensor_to_body
-from magcomp.autopilots.px4_settings import NUMBERS, compasses, slot_of
+from magcomp.autopilots.px4_correction import Compensation, stored
 from magcomp.model import BoolArray, FloatArray, Series
 from magcomp.sources.ulog_file import MICROSECOND, Topic, UlogFile
 
@@ -25,13 +21,6 @@ _THRUST_TOPIC_ALONE = (1, 14)
 """From here on P is the length of the thrust setpoint; before it was control 3."""
 
 _EARLIEST_UTC_US = 1.0e15
-
-
-class Field(NamedTuple):
-    """The readings of one compass in body axes, mGauss, and whether they are the sensor's own."""
-
-    field: Series
-    raw: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,56 +47,6 @@ class Quantities:
     def rows(self) -> int:
         """Messages of all topics that are read."""
         return sum(map(len, self.log.topics.values()))
-
-    def compasses(self) -> dict[int, Field]:
-        """Each compass by its number: the sensors' own fields, else the corrected ones."""
-        names = ("device_id", "x", "y", "z")
-        raw = self.log.instances("sensor_mag", *names)
-        if raw:
-            tables = [
-                (topic, np.stack([topic.number(axis) for axis in "xyz"], axis=1))
-                for topic in raw.values()
-            ]
-            return self._by_device(tables, raw=True)
-        parts = [f"magnetometer_ga[{axis}]" for axis in range(3)]
-        corrected = self.log.instances("vehicle_magnetometer", *parts)
-        if not corrected and (topic := self.log.topic("sensor_combined", *parts)) is not None:
-            corrected = {0: topic}
-        tables = [(topic, topic.vector("magnetometer_ga", 3)) for topic in corrected.values()]
-        return self._by_device(tables, raw=False)
-
-    def _by_device(self, tables: list[tuple[Topic, FloatArray]], *, raw: bool) -> dict[int, Field]:
-        """Rows of all instances by the slot of their device: which one reports may change."""
-        rows: dict[int, list[tuple[FloatArray, FloatArray]]] = {}
-        for topic, value in tables:
-            time = self._time(topic)
-            sound = np.isfinite(value).all(axis=1) & (value != 0.0).any(axis=1)
-            devices = topic.columns.get("device_id", np.zeros(len(time)))
-            for device in np.unique(devices[sound]).tolist():
-                mine = sound & (devices == device)
-                rows.setdefault(int(device), []).append((time[mine], value[mine]))
-        numbers = self._numbers(rows)
-        found = {}
-        for device, parts in rows.items():
-            if device in numbers:
-                turn = sensor_to_body(self.values, numbers[device]) if raw else np.eye(3)
-                time = np.concatenate([part[0] for part in parts])
-                value = MGAUSS * np.concatenate([part[1] for part in parts]) @ turn.T
-                order = np.argsort(time, kind="stable")
-                found[numbers[device]] = Field(Series(time[order], value[order]), raw)
-        return dict(sorted(found.items()))
-
-    def _numbers(self, devices: Mapping[int, object]) -> dict[int, int]:
-        """The compass of each device; those without a slot get the numbers that are left."""
-        found = {
-            device: number
-            for device in devices
-            if (number := slot_of(self.values, device)) is not None
-        }
-        without = (device for device in devices if device not in found)
-        taken = {compass.slot for compass in compasses(self.values)}
-        left = (number for number in NUMBERS if number not in taken)
-        return found | dict(zip(without, left, strict=False))
 
     def attitude(self) -> Series | None:
         """Roll, pitch, yaw in radians from the unit quaternion w, x, y, z."""
@@ -262,14 +201,11 @@ class Quantities:
 
     def _time(self, topic: Topic) -> FloatArray:
         """When each row was measured, seconds, never decreasing."""
-        return self._seconds(topic.stamp())
+        return topic.measured(self.zero)
 
     def _said(self, topic: Topic) -> FloatArray:
         """When each row was said, seconds."""
-        return self._seconds(topic.columns["timestamp"])
-
-    def _seconds(self, stamp: NDArray[Any]) -> FloatArray:
-        return (stamp.astype(np.float64) - float(self.zero)) * MICROSECOND
+        return topic.said(self.zero)
 
 
 def _on_earth(value: FloatArray) -> BoolArray:

@@ -130,6 +130,18 @@ def test_a_second_battery_that_feeds_the_motors_is_named(swept: Recording) -> No
     assert any("current of battery 1 rises" in note for note in notes)
 
 
+def test_the_speed_controllers_current_is_fitted_to_be_looked_at(swept: Recording) -> None:
+    escs = Series(swept.current.time, 0.9 * swept.current.value)
+    found = analyse(replace(swept, esc_current=escs), Options(regressor="esc"))
+    by_battery = analyse(swept).compasses[0].fit.interference
+    np.testing.assert_allclose(found.compasses[0].fit.interference, by_battery / 0.9, rtol=0.02)
+    assert "speed controllers" in found.compasses[0].fit.origin
+    assert "speed controllers" in found.only_to_look_at
+    assert not parameter_set(found, include_rejected=True).values
+    with pytest.raises(MissingDataError, match="current of speed controllers"):
+        analyse(swept, Options(regressor="esc"))
+
+
 def test_a_planes_throttle_is_not_what_its_firmware_multiplies(swept: Recording) -> None:
     throttle = Series(swept.current.time, swept.current.value / 100.0)
     plane = of_kind(replace(swept, throttle=throttle), "plane")

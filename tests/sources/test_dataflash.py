@@ -24,12 +24,15 @@ from magcomp.sources.dataflash.table import Unpacked
 from magcomp.sources.source import mapped
 
 FLIGHT = Path(__file__).parents[2] / "sitl_fixtures" / "flight.BIN"
+TEXT_LOGS = [
+    path for path in REAL_LOGS if path.suffix == ".log" and not path.stem.startswith("air_data")
+]
 BINARY_LOGS = [FLIGHT, *(path for path in REAL_LOGS if path.suffix.lower() == ".bin")]
 
 
 def taken_apart(path: Path) -> Unpacked:
     with mapped(path) as data:
-        return binary.unpack(data, MESSAGES)
+        return (text if path in TEXT_LOGS else binary).unpack(data, MESSAGES)
 
 
 def from_bytes(folder: Path, data: bytes) -> Recording:
@@ -41,12 +44,13 @@ def from_bytes(folder: Path, data: bytes) -> Recording:
 # ---------------------------------------------------------------- against pymavlink
 
 
-@pytest.mark.parametrize("path", BINARY_LOGS, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", [*BINARY_LOGS, *TEXT_LOGS], ids=lambda path: path.stem)
 def test_every_column_of_every_wanted_message_is_what_pymavlink_reads(path: Path) -> None:
     ours = taken_apart(path).tables
     theirs: dict[str, list[list[object]]] = {}
     names: dict[str, list[str]] = {}
-    reader = DFReader.DFReader_binary(str(path))
+    is_text = path in TEXT_LOGS
+    reader = (DFReader.DFReader_text if is_text else DFReader.DFReader_binary)(str(path))
     while (message := reader.recv_match(type=list(MESSAGES))) is not None:
         kind = message.get_type()
         names[kind] = message.get_fieldnames()
@@ -145,6 +149,22 @@ def test_an_unhealthy_reading_is_no_reading(tmp_path: Path) -> None:
     assert len(from_bytes(tmp_path, log.binary()).field[1]) == 15
 
 
+@pytest.mark.parametrize("numbered", [True, False])
+def test_the_speed_controllers_currents_are_summed(tmp_path: Path, numbered: bool) -> None:
+    if numbered:
+        forms = [Form(101, "ESC", "QBf", "TimeUS,Instance,Curr")] * 2
+    else:
+        forms = [Form(101 + n, f"ESC{n + 1}", "QH", "TimeUS,Curr") for n in range(2)]
+    log = Writer(forms=(FMT, *{form.name: form for form in forms}.values()))
+    for k in range(20):
+        for n, form in enumerate(forms):
+            amperes = 2.0 + n + k
+            log.add(form, 1000 * k, *((n, amperes) if numbered else (100 * amperes,)))
+    found = from_bytes(tmp_path, log.binary())
+    np.testing.assert_allclose(found.esc_current.value, 5.0 + 2.0 * np.arange(20))
+    assert found.current is None
+
+
 def test_a_number_that_no_compass_or_battery_has_is_damage(tmp_path: Path) -> None:
     log = short_flight(1.0)
     log.add(MAG, 9_000_000, 163, 200, 1, 400, 12, -8, 0, 3, 0, -2, 1, 0)
@@ -185,6 +205,7 @@ def test_a_header_inside_a_record_is_no_record(tmp_path: Path) -> None:
     assert set(found.current.value) == {5.0}
     assert found.report.frames == 60 + len(log.forms)
     assert found.report.skipped == 0
+    assert found.report.notes == ()
 
 
 def test_zeros_at_the_end_and_a_cut_record_are_left_out(tmp_path: Path) -> None:
@@ -218,6 +239,14 @@ def test_a_clock_that_starts_again_goes_on_and_a_damaged_stamp_does_not_count(
     assert (np.diff(current.time) >= 0).all()
 
 
+def test_a_clock_that_starts_again_is_told_to_the_user(tmp_path: Path) -> None:
+    log = Writer()
+    for k in range(60):
+        log.add(BAT, 100_000 * (k % 30), 0, 12.0, float(k))
+    (note,) = from_bytes(tmp_path, log.binary()).report.notes
+    assert "starts again at 3 s" in note
+
+
 def test_rows_without_any_time_stand_in_their_order(tmp_path: Path) -> None:
     mag = Form(100, "MAG", "hhh", "MagX,MagY,MagZ")
     att = Form(101, "ATT", "ccC", "Roll,Pitch,Yaw")
@@ -229,6 +258,7 @@ def test_rows_without_any_time_stand_in_their_order(tmp_path: Path) -> None:
         found = from_bytes(tmp_path, data)
         assert len(found.field[1]) == len(found.attitude) == 50
         assert found.duration_s == pytest.approx(4.9, abs=0.2)
+        assert "no times" in found.report.notes[0]
 
 
 def test_parameters_that_are_no_numbers_stay_to_be_named(tmp_path: Path) -> None:

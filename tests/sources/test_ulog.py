@@ -86,6 +86,35 @@ def test_readings_of_a_compass_that_takes_over_go_to_its_own_slot(recorded) -> N
     assert not found.raw_compasses
 
 
+@pytest.mark.parametrize(
+    ("told", "switch", "raw"),
+    [(0.0, 0, False), (0.004, 0, True), (0.0, 2, True)],
+    ids=["undone", "by another offset", "with compensation"],
+)
+def test_the_corrected_field_is_taken_where_the_log_shows_that_it_can_be_undone(
+    recorded, told: float, switch: int, raw: bool
+) -> None:
+    """PX4 logs the sensors' own field once a second, and one corrected field twice."""
+    offset = (0.05, -0.08, 0.12)
+    writer = Writer(
+        parameters={
+            "CAL_MAG_COMP_TYP": switch,
+            **slot(0, 222, OFF=offset, COMP=(1.0, 0.0, 0.0)),
+        }
+    )
+    shift = np.array([told, 0.0, 0.0])
+    noise = np.random.default_rng(1).normal(scale=0.002, size=(120, 3))
+    for n in range(120):
+        time, stamp = n / 2, START_US + n * 500_000
+        field = np.array([0.2 + 0.1 * np.sin(n / 9), 0.1, 0.4])
+        writer.row("vehicle_magnetometer", time, stamp, 222, *(field + shift))
+        if n % 2 == 0:
+            writer.row("sensor_mag", time, stamp, 222, *(field + offset + noise[n]))
+    found = recorded(writer)
+    assert found.raw_compasses == ({1} if raw else set())
+    assert len(found.field[1]) == (60 if raw else 120)
+
+
 def test_an_old_log_has_its_compass_among_the_combined_sensors(recorded) -> None:
     writer = Writer(release=0x010600FF, parameters={"CAL_MAG0_ID": 5})
     for n in range(5):
@@ -208,18 +237,33 @@ def test_rows_of_another_day_and_out_of_order_do_not_spoil_the_time(recorded) ->
     assert 33.0 in found.current.value
 
 
+def test_what_was_said_before_the_log_does_not_move_its_beginning(recorded) -> None:
+    writer = short_flight(2)
+    writer.row("vehicle_gps_position", -4.0, 0, 473_977_420, 85_455_940, 488_000, 3)
+    found = recorded(writer)
+    assert found.duration_s == pytest.approx(1.9)
+    assert found.field[1].time[0] == 0.0
+
+
 @pytest.mark.parametrize("path", [*RECORDINGS, *REAL], ids=lambda path: path.stem)
 def test_every_wanted_field_is_what_the_reference_reads(path: Path) -> None:
     found, reference = read(path), ULog(str(path))
     numbers = {compass.device_id: compass.slot for compass in found.vehicle.compasses}
-    sensors = [topic for topic in reference.data_list if topic.name == "sensor_mag"]
-    for topic in sensors:
-        number = numbers[int(topic.data["device_id"][0])]
-        strength = np.sqrt(sum(topic.data[axis].astype(float) ** 2 for axis in "xyz"))
-        series = found.field[number]
-        assert np.allclose(np.linalg.norm(series.value, axis=1), 1000 * strength)
-        stamps = topic.data["timestamp_sample"].astype(float) * 1e-6
-        assert np.allclose(np.diff(series.time), np.diff(stamps))
+    for topic in reference.data_list:
+        raw = topic.name == "sensor_mag"
+        if topic.name not in ("sensor_mag", "vehicle_magnetometer"):
+            continue
+        fields = "xyz" if raw else [f"magnetometer_ga[{axis}]" for axis in range(3)]
+        for device in np.unique(topic.data.get("device_id", [])).tolist():
+            number = numbers.get(device)
+            if number is None or raw is not (number in found.raw_compasses):
+                continue
+            rows = topic.data["device_id"] == device
+            strength = np.sqrt(sum(topic.data[each][rows].astype(float) ** 2 for each in fields))
+            series = found.field[number]
+            assert np.allclose(np.linalg.norm(series.value, axis=1), 1000 * strength)
+            stamps = topic.data["timestamp_sample"][rows].astype(float) * 1e-6
+            assert np.allclose(np.diff(series.time), np.diff(stamps))
     for name, value in reference.initial_parameters.items():
         assert found.parameters.of(name)[0].value == value
 

@@ -216,6 +216,7 @@ def snapshot(**changes: object) -> LiveSnapshot:
         link_text="connected",
         armed=True,
         elapsed_s=83.0,
+        recorded_s=83.0,
         recording_path=Path("recording-20250615T150640Z.tlog"),
         recording_bytes=1_240_000,
         recording=True,

@@ -11,10 +11,12 @@ import pytest
 import scripted
 from hypothesis import given
 from hypothesis import strategies as st
+from rich.cells import cell_len
 from scripted import screen, until
 from textual.color import Color
 
 from magcomp.model import Grade, ParameterSet
+from magcomp.tui.ascii import is_ascii_only, plain
 from magcomp.tui.before_after import HeadingPair, HeadingWatch, heading_pairs
 from magcomp.tui.changes import after_event, change_rows
 from magcomp.tui.pictures import round_ticks
@@ -80,6 +82,37 @@ def test_in_sunlight_every_colour_stands_out_seven_to_one():
     inks = (SUN.foreground, SUN.primary, SUN.accent, SUN.success, SUN.warning, SUN.error)
     for ink in (*inks, SUN.variables["quiet"]):
         assert (paper + 0.05) / (luminance(ink) + 0.05) >= 7.0
+
+
+@given(text=st.text())
+def test_a_terminal_without_unicode_gets_as_many_cells_of_ascii(text):
+    assert plain(text).isascii()
+    assert cell_len(plain(text)) == cell_len(text)
+
+
+@pytest.mark.parametrize(
+    ("encoding", "environment", "only"),
+    [
+        ("utf-8", {"LANG": "en_GB.UTF-8"}, False),
+        ("utf-8", {}, False),
+        ("utf-8", {"LANG": "C"}, True),
+        ("utf-8", {"LANG": "C", "LC_ALL": "C.UTF-8"}, False),
+        ("ascii", {"LANG": "en_GB.UTF-8"}, True),
+        ("ANSI_X3.4-1968", {}, True),
+        (None, {}, False),
+    ],
+)
+def test_who_has_only_ascii_is_known_by_encoding_and_locale(encoding, environment, only):
+    assert is_ascii_only(encoding, environment) is only
+
+
+async def test_every_screen_is_drawn_in_ascii_where_there_is_nothing_else(tmp_path):
+    app = scripted.app(tmp_path, ascii_only=True)
+    async with app.run_test() as pilot:
+        app.set_work(made.work())
+        app.action_go("fit")
+        await until(pilot, lambda: "Heading error" in screen(app))
+        assert scripted.picture(app).isascii()
 
 
 @given(share=st.floats(allow_nan=False), width=st.integers(0, 200))

@@ -83,7 +83,7 @@ def _nothing(source: str, unpacked: Unpacked, size: int) -> str:
 
 
 def _recording(source: str, unpacked: Unpacked, size: int) -> Recording:
-    times, _told = time_axis(unpacked.tables)
+    times, notes = time_axis(unpacked.tables)
     log = Log(unpacked.tables, times)
     changes = quantities.parameters(log)
     parameters = ParameterHistory(tuple(changes), _is_whole(unpacked, len(changes)))
@@ -107,6 +107,7 @@ def _recording(source: str, unpacked: Unpacked, size: int) -> Recording:
             frames=unpacked.records,
             used=sum(map(len, unpacked.tables.values())),
             skipped=unpacked.skipped,
+            notes=notes,
         ),
         attitude=attitudes.get(attitude),
         gyro=gyro,
@@ -121,6 +122,7 @@ def _recording(source: str, unpacked: Unpacked, size: int) -> Recording:
         other_currents={number: each for number, each in current.items() if number},
         applied=_applied(readings, parameters),
         attitude_source=attitude,
+        esc_current=quantities.esc_current(log),
         other_attitudes={name: each for name, each in attitudes.items() if name != attitude},
     )
 

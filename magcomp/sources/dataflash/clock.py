@@ -27,30 +27,44 @@ _NEIGHBOURS = 4
 _ROUND_S = 0.1
 # Of old firmware: GPS.TimeMS is that of the satellites, and T the autopilot's.
 _SATELLITES, _BOARD = "GPS", "T"
+_NO_TIME = (
+    "the log holds no times: the order of its rows stands for them, ten rounds a second, so no "
+    "delay and no rate is known"
+)
+_MOST_NAMED = 3
 _UNTIMED = ("PARM", "MSG", "VER", "ORGN")
 
 
-def time_axis(tables: Tables) -> tuple[Times, bool]:
-    """Times from the first message, and whether they are the autopilot's.
+def time_axis(tables: Tables) -> tuple[Times, tuple[str, ...]]:
+    """Times from the first message, and what a user should know of them.
 
     Returns
     -------
     times
         Rows whose time cannot be told are NaN.
-    told
-        False where the order of the rows stands for a clock, at ten rounds a second.
+    notes
+        A sentence each, without its full stop.
     """
     stamps = {name: _stamps(name, table) for name, table in tables.items()}
     stamped = {name: stamp for name, stamp in stamps.items() if stamp is not None}
-    told = any(np.isfinite(stamp).any() for stamp in stamped.values())
-    if not told:
+    notes: tuple[str, ...] = ()
+    if not any(np.isfinite(stamp).any() for stamp in stamped.values()):
+        notes = (_NO_TIME,)
         stamped = _rounds(tables)
         if not stamped:
-            return {name: np.zeros(len(table)) for name, table in tables.items()}, False
+            return {name: np.zeros(len(table)) for name, table in tables.items()}, notes
     if not all(map(_is_steady, stamped.values())) or len(stamped) < len(tables):
-        return _mended(tables, stamped), told
+        times, restarts = _mended(tables, stamped)
+        return times, (*notes, *map(_restarted, restarts))
     zero = min(float(stamp[0]) for stamp in stamped.values())
-    return {name: stamp - zero for name, stamp in stamped.items()}, told
+    return {name: stamp - zero for name, stamp in stamped.items()}, notes
+
+
+def _restarted(at_s: float) -> str:
+    return (
+        f"the autopilot's clock starts again at {at_s:.0f} s: what follows is another flight, "
+        "joined without the pause between them"
+    )
 
 
 def last_time(times: Times) -> float:
@@ -91,8 +105,8 @@ def _rounds(tables: Tables) -> dict[str, FloatArray]:
     return {leading: _ROUND_S * rounds}
 
 
-def _mended(tables: Tables, stamped: Times) -> Times:
-    """Times of all rows where some have none, or the clock jumps."""
+def _mended(tables: Tables, stamped: Times) -> tuple[Times, list[float]]:
+    """Times of all rows where some have none, or the clock jumps; when it starts again."""
     place = np.concatenate([tables[name].place for name in stamped])
     time = np.concatenate(list(stamped.values()))
     order = np.argsort(place, kind="stable")
@@ -103,9 +117,10 @@ def _mended(tables: Tables, stamped: Times) -> Times:
     place, time = place[good], time[good]
     step = np.diff(time)
     # The clock starts again with the autopilot, and no log says how long it was off.
-    restart = np.cumsum(np.where(step < -_DISORDER_S, -step, 0.0))
-    unrolled: FloatArray = time + np.append(0.0, restart)
+    back = step < -_DISORDER_S
+    unrolled: FloatArray = time + np.append(0.0, np.cumsum(np.where(back, -step, 0.0)))
     zero = float(unrolled.min())
+    restarts = (unrolled[1:][back][:_MOST_NAMED] - zero).tolist()
     result = {}
     for name, table in tables.items():
         own = stamped.get(name)
@@ -115,7 +130,7 @@ def _mended(tables: Tables, stamped: Times) -> Times:
             continue
         at = np.minimum(at, len(place) - 1)
         result[name] = np.where(place[at] == table.place, unrolled[at] - zero, np.nan)
-    return result
+    return result, restarts
 
 
 def _strays(time: FloatArray) -> NDArray[np.bool_]:

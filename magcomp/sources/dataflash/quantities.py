@@ -13,6 +13,7 @@ from magcomp.sources.dataflash.table import Table, Tables
 
 _COLUMNS = """
     MAG MAG2 MAG3 BAT BAT2 CURR CUR2 CTUN THR RCOU RCO2 RCO3
+    ESC ESC1 ESC2 ESC3 ESC4 ESC5 ESC6 ESC7 ESC8
     ATT XKF1 XKF4 XKF6 NKF1 NKF4 NKF6 AHR2 IMU GPS POS ORGN
     PARM VER MSG EV ARM STAT
 """
@@ -25,6 +26,7 @@ _OFFSETS = (("OfsX", "OfsY", "OfsZ"),)
 _MOTORS = (("MOX", "MOY", "MOZ"), ("MOfsX", "MOfsY", "MOfsZ"))
 _INSTANCES = ("I", "Instance", "Inst")
 _BATTERIES = (("BAT", 0), ("CURR", 0), ("BAT2", 1), ("CUR2", 1))
+_ESCS = ("ESC", *(f"ESC{number}" for number in range(1, 9)))
 _OUTPUTS = (("RCOU", 0), ("RCO2", 14), ("RCO3", 18))
 _OUTPUT_NAMES = ("C", "Chan", "Ch")
 _MOST_OUTPUTS = 32
@@ -113,6 +115,25 @@ def batteries(log: Log) -> tuple[dict[int, Series], dict[int, Series]]:
                 if series is not None:
                     into[each] = series
     return current, voltage
+
+
+def esc_current(log: Log) -> Series | None:
+    """Sum of the speed controllers' currents, A, at the times of the one that reports first."""
+    found: list[Series] = []
+    for name in _ESCS:
+        got = log.get(name)
+        if got is None or "Curr" not in got[1].names:
+            continue
+        time, table = got
+        value = table.numbers("Curr") * (1.0 if table.is_float("Curr") else _CENTI)
+        sound = np.abs(value) < _MOST_OF_A_BATTERY
+        each = (_series(time, value, rows & sound) for _, rows in _instances(table, 0))
+        found.extend(series for series in each if series is not None)
+    if not found:
+        return None
+    at = found[0].time
+    total = sum((np.interp(at, each.time, each.value) for each in found), np.zeros(len(at)))
+    return Series(at, total)
 
 
 def throttle(log: Log, kind: str) -> Series | None:

@@ -143,7 +143,7 @@ class Unpacked(NamedTuple):
     records
         Whole records found, wanted or not.
     skipped
-        Bytes, or lines of a text, that belong to none.
+        Bytes that belong to none.
     first_gap
         Place of the first of those; the end of the log where there is none.
     preface

@@ -61,7 +61,7 @@ def unpack(octets: ByteArray, wanted: Collection[str]) -> Unpacked:
     return Unpacked(
         tables=tables,
         records=records,
-        skipped=len(after),
+        skipped=int((end[after] - begin[after]).sum()),
         first_gap=int(after[0]) if len(after) else len(begin),
         counts={name: len(at) for name, at in known.items()},
         preface="\n".join(line.decode("latin-1") for line in preface),

@@ -72,6 +72,10 @@ is enough, press N. You can fit at any time and come back: the recording goes on
         if live is None:
             self.say("Connect to a vehicle first: press B.")
             return
+        self.set_class(not live.connected, "-stale")
+        self.query_one("#now").border_title = (
+            "Compasses" if live.connected else "Compasses, as last heard"
+        )
         self.query_one(LiveTable).show(live)
         self.query_one(ControlBars).show(live)
         self.query_one(CoverageMap).show(live.coverage)
@@ -107,7 +111,7 @@ def next_sentence(live: LiveSnapshot) -> str:
 
 def facts_line(live: LiveSnapshot) -> Content:
     """How far, how long, where to, and how well it arrives."""
-    minutes, seconds = divmod(int(live.elapsed_s), 60)
+    minutes, seconds = divmod(int(live.recorded_s), 60)
     share = live.guidance.share_done
     field = max((live.link.rates.get(name, 0.0) for name in _FIELD_MESSAGES), default=0.0)
     first = Content.assemble(

@@ -77,7 +77,8 @@ class StepScreen(Screen[None]):
     def _show_keys(self) -> None:
         """Look for the keys anew, but only where they may differ: it is not cheap."""
         work, writing = self.state.work, self.state.writing
-        bindings = work.source, work.live, bool(writing.in_force)
+        grade = None if work.analysis is None else work.analysis.grade
+        bindings = work.source, work.live, bool(writing.in_force), grade
         if bindings != self._bindings_drawn:
             self._bindings_drawn = bindings
             self.refresh_bindings()

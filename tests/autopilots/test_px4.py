@@ -1,0 +1,397 @@
+"""PX4's correction, forward and backward, what is in force of its parameters, and what is written.
+
+Held against the firmware's own formula and dead zones as px4_truth writes them down.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import px4_truth
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from magcomp import autopilots
+from magcomp.autopilots.px4 import Px4
+from magcomp.autopilots.px4_correction import (
+    Calibration,
+    Compensation,
+    body_correction,
+    correct,
+    sensor_calibration,
+    uncorrect,
+)
+from magcomp.autopilots.px4_names import vector_names
+from magcomp.autopilots.px4_rotation import ROTATIONS, sensor_to_body
+from magcomp.errors import MissingDataError, ParameterFileError
+from magcomp.model import (
+    CURRENT,
+    THROTTLE,
+    Compass,
+    Correction,
+    ParameterChange,
+    ParameterHistory,
+    ReadReport,
+    Recording,
+    Series,
+    Vehicle,
+    symmetric,
+)
+
+PX4 = Px4()
+
+gauss = st.tuples(*[st.floats(-1.0, 1.0)] * 3).map(np.array)
+comps = st.tuples(*[st.floats(-5.0, 5.0)] * 3).map(np.array)
+scales = st.tuples(*[st.floats(0.8, 1.2)] * 3).map(np.array)
+off_diagonals = st.tuples(*[st.floats(-0.2, 0.2)] * 3).map(np.array)
+switches = st.sampled_from([c for c in Compensation if c is not Compensation.OFF])
+calibrations = st.builds(Calibration, gauss, scales, off_diagonals, comps, switches)
+rotations = st.sampled_from(sorted(ROTATIONS))
+fields = st.lists(gauss, min_size=1, max_size=4).map(np.array)
+numbers = st.sampled_from([1, 2, 3, 4])
+quantities = st.sampled_from([CURRENT, THROTTLE])
+soft_irons = st.tuples(scales, off_diagonals).map(lambda two: symmetric(np.concatenate(two)))
+corrections = st.builds(
+    Correction,
+    offset=gauss.map(lambda v: 400.0 * v),
+    soft_iron=soft_irons,
+    motor=comps,
+)
+
+
+def held(number: int = 1, **changed: tuple[float, float, float] | float) -> dict[str, float]:
+    """What a vehicle holds of one calibrated compass."""
+    values = {
+        "CAL_MAG_COMP_TYP": 0.0,
+        f"CAL_MAG{number - 1}_ID": 100.0 + number,
+        f"CAL_MAG{number - 1}_ROT": -1.0,
+        f"CAL_MAG{number - 1}_PRIO": 50.0,
+    }
+    usual = {
+        "OFF": (0.05, -0.08, 0.12),
+        "SCALE": (1.03, 0.97, 1.05),
+        "ODIAG": (0.02, -0.015, 0.012),
+        "COMP": (0.0, 0.0, 0.0),
+    }
+    for kind, vector in usual.items():
+        values |= dict(zip(vector_names(kind, number), changed.pop(kind, vector), strict=True))
+    return {**values, **changed}
+
+
+def history(*steps: tuple[float, dict[str, float]], whole: bool = True) -> ParameterHistory:
+    changes = (ParameterChange(t, name, v) for t, values in steps for name, v in values.items())
+    return ParameterHistory(tuple(changes), whole)
+
+
+# --- the correction, both ways -------------------------------------------------------------------
+
+
+@given(calibrations, fields, st.floats(0.0, 0.1))
+def test_undoing_a_correction_is_the_inverse_of_applying_it(calibration, sensor, power):
+    quantity = np.full(len(sensor), power)
+    back = uncorrect(correct(sensor, quantity, calibration), quantity, calibration)
+    assert np.allclose(back, sensor, atol=1e-9)
+
+
+@given(calibrations, rotations, fields, st.floats(0.0, 1.0))
+def test_magcomps_own_form_corrects_as_the_firmware_does(calibration, rotation, sensor, share):
+    turn = sensor_to_body({"CAL_MAG0_ROT": float(rotation)}, 1)
+    power, u = share, share
+    if calibration.compensation is not Compensation.THRUST:
+        power, u = 0.1 * share, 100.0 * share
+    ours = body_correction(calibration, turn).apply(
+        1000.0 * sensor @ turn.T, np.full(len(sensor), u)
+    )
+    theirs = 1000.0 * correct(sensor, np.full(len(sensor), power), calibration) @ turn.T
+    assert np.allclose(ours, theirs, atol=1e-6)
+
+
+@given(calibrations, rotations)
+def test_a_calibration_comes_back_from_magcomps_own_form(calibration, rotation):
+    turn = sensor_to_body({"CAL_MAG0_ROT": float(rotation)}, 1)
+    back = sensor_calibration(body_correction(calibration, turn), turn, calibration.compensation)
+    for name in ("offset", "scale", "off_diagonal", "motor"):
+        assert np.allclose(getattr(back, name), getattr(calibration, name), atol=1e-9)
+
+
+@pytest.mark.parametrize("number", sorted(ROTATIONS))
+def test_every_rotation_is_one(number: int) -> None:
+    turn = sensor_to_body({"CAL_MAG0_ROT": float(number)}, 1)
+    assert np.allclose(turn @ turn.T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(turn) == pytest.approx(1.0)
+
+
+def test_rotations_turn_as_the_firmware_was_seen_to() -> None:
+    turned = sensor_to_body({"CAL_MAG2_ROT": 10.0}, 3)
+    assert np.allclose(turned, [[0, 1, 0], [1, 0, 0], [0, 0, -1]], atol=1e-12)
+    by_angles = {"CAL_MAG2_ROT": 100.0, "CAL_MAG2_ROLL": 180.0, "CAL_MAG2_YAW": 90.0}
+    assert np.allclose(sensor_to_body(by_angles, 3), turned, atol=1e-12)
+
+
+def test_a_board_turns_its_own_compasses_and_its_level_turns_all() -> None:
+    board = {"SENS_BOARD_ROT": 2.0, "CAL_MAG0_ROT": -1.0, "CAL_MAG1_ROT": 0.0}
+    assert np.allclose(sensor_to_body(board, 1) @ [1, 0, 0], [0, 1, 0], atol=1e-12)
+    assert np.allclose(sensor_to_body(board, 2), np.eye(3))
+    level = {**board, "SENS_BOARD_Z_OFF": 90.0}
+    assert np.allclose(sensor_to_body(level, 1) @ [1, 0, 0], [-1, 0, 0], atol=1e-12)
+    assert np.allclose(sensor_to_body(level, 2) @ [1, 0, 0], [0, 1, 0], atol=1e-12)
+
+
+# --- what is written is what comes into force ----------------------------------------------------
+
+
+def in_the_firmware(
+    before: dict[str, float], written: dict[str, float], number: int, *, restarted: bool
+) -> Calibration:
+    start = px4_truth.AT_START
+    running = px4_truth.through_dead_zones(start, before, number - 1)
+    now = px4_truth.through_dead_zones(
+        start if restarted else running, {**before, **written}, number - 1
+    )
+    switch = Compensation(int({**before, **written}["CAL_MAG_COMP_TYP"]))
+    return Calibration(now["OFF"], now["SCALE"], now["ODIAG"], now["COMP"], switch)
+
+
+@given(corrections, numbers, quantities, rotations, st.booleans(), st.sampled_from([0, 1]))
+def test_what_is_written_is_what_the_firmware_applies(
+    correction, number, regressor, rotation, restarted, battery
+):
+    before = held(number, **{f"CAL_MAG{number - 1}_ROT": float(rotation)})
+    written = PX4.switch_parameters(regressor, [number], before, battery=battery)
+    written |= PX4.correction_parameters(
+        correction, number, before, regressor=regressor, soft_iron_fitted=True
+    )
+    firmware = in_the_firmware(before, written, number, restarted=restarted)
+    applied = body_correction(firmware, sensor_to_body(before, number))
+    # What the firmware would not notice is moved by less than its dead zones.
+    assert np.allclose(applied.soft_iron, correction.soft_iron, atol=0.011)
+    assert np.abs(applied.offset - correction.offset).max() < 11.0
+    assert np.allclose(applied.motor, correction.motor, atol=2e-5)
+
+
+@given(st.tuples(*[st.floats(-0.012, 0.012)] * 3).map(np.array), st.booleans(), rotations)
+def test_an_offset_too_near_to_be_noticed_turns_the_heading_little(away, restarted, rotation):
+    before = held(1, CAL_MAG0_ROT=float(rotation))
+    turn = sensor_to_body(before, 1)
+    present = PX4.in_force(before, 1).correction
+    moved = Correction(present.offset - 1000.0 * turn @ away, present.soft_iron, np.ones(3))
+    written = PX4.correction_parameters(moved, 1, before, regressor=CURRENT, soft_iron_fitted=False)
+    written["CAL_MAG_COMP_TYP"] = 2.0
+    firmware = in_the_firmware(before, written, 1, restarted=restarted)
+    missed = body_correction(firmware, turn).offset - moved.offset
+    # All of it would be up to 5 mGauss level, 1.3° at 216 mGauss of horizontal field.
+    assert np.hypot(*missed[:2]) < 2.0
+
+
+def test_a_compass_whose_calibration_is_right_keeps_it_to_the_last_bit():
+    before = held(1)
+    exact = PX4.in_force(before, 1).correction
+    turned = np.array([1.0, -0.5, 2.0])
+    fitted = Correction(exact.offset + 0.4 * turned, exact.soft_iron, np.array([2.0, -1, 3]))
+    written = PX4.correction_parameters(
+        fitted, 1, before, regressor=CURRENT, soft_iron_fitted=False
+    )
+    assert [written[name] for name in vector_names("OFF", 1)] == pytest.approx([0.05, -0.08, 0.12])
+    assert not set(written) & {*vector_names("SCALE", 1), *vector_names("ODIAG", 1)}
+
+
+def test_an_offset_that_swallowed_the_hover_is_put_back_with_the_motor_vector():
+    swallowed = held(1, OFF=(0.09, -0.1, 0.16))
+    right = PX4.in_force(held(1), 1).correction
+    fitted = Correction(right.offset, right.soft_iron, np.array([2.0, -1.0, 3.0]))
+    written = PX4.correction_parameters(
+        fitted, 1, swallowed, regressor=CURRENT, soft_iron_fitted=False
+    )
+    assert [written[name] for name in vector_names("OFF", 1)] == pytest.approx([0.05, -0.08, 0.12])
+
+
+def test_the_unit_is_that_of_the_switch():
+    before = held(1, SCALE=(1.0, 1.0, 1.0), ODIAG=(0.0, 0.0, 0.0))
+    present = PX4.in_force(before, 1).correction
+    moved = Correction(present.offset, present.soft_iron, np.array([50.0, 20.0, -10.0]))
+    by = {
+        kind: [
+            PX4.correction_parameters(moved, 1, before, regressor=kind, soft_iron_fitted=False)[n]
+            for n in vector_names("COMP", 1)
+        ]
+        for kind in (CURRENT, THROTTLE)
+    }
+    assert by[CURRENT] == pytest.approx([50.0, 20.0, -10.0])  # mGauss per A, gauss per kA
+    assert by[THROTTLE] == pytest.approx([0.05, 0.02, -0.01])
+
+
+# --- the switch ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("regressor", "battery", "value"), [(THROTTLE, 0, 1), (CURRENT, 0, 2), (CURRENT, 1, 3)]
+)
+def test_the_switch_names_the_quantity_and_its_battery(regressor, battery, value):
+    made = PX4.switch_parameters(regressor, [1], held(1), battery=battery)
+    assert made == {"CAL_MAG_COMP_TYP": value}
+
+
+def test_the_switch_wakes_no_vector_that_was_not_fitted():
+    values = {**held(1), **held(2, COMP=(7.0, 0.0, 0.0))}
+    made = PX4.switch_parameters(CURRENT, [1], values)
+    assert [made[name] for name in vector_names("COMP", 2)] == [0.0, 0.0, 0.0]
+    assert not set(made) & set(vector_names("COMP", 1))
+
+
+def test_a_vector_in_force_for_the_same_quantity_stays():
+    values = {**held(1), **held(2, COMP=(7.0, 0.0, 0.0)), "CAL_MAG_COMP_TYP": 2.0}
+    assert PX4.switch_parameters(CURRENT, [1], values) == {"CAL_MAG_COMP_TYP": 2.0}
+    assert PX4.neutral_parameters(2, THROTTLE, values)["CAL_MAG1_XCOMP"] == 0.0
+
+
+# --- what of the parameters is in force ----------------------------------------------------------
+
+FLIGHT = Series(np.array([0.0, 10.0, 50.0]), np.array([0.0, 1.0, 0.0]))
+"""Disarmed, armed from 10 s, disarmed from 50 s."""
+
+
+def in_force(parameters: ParameterHistory, time: float) -> Correction:
+    return PX4.in_force_at(parameters, 1, time, armed=FLIGHT).correction
+
+
+@pytest.mark.parametrize(
+    ("changed", "is_in_force"),
+    [
+        ({"OFF": (0.003, 0.002, 0.001)}, False),
+        ({"OFF": (0.004, 0.003, 0.002)}, True),
+        ({"SCALE": (1.005, 1.005, 0.995)}, False),
+        ({"SCALE": (1.02, 1.0, 1.0)}, True),
+        ({"ODIAG": (0.005, 0.005, -0.005)}, False),
+        ({"ODIAG": (0.009, 0.009, 0.0)}, True),
+    ],
+)
+def test_what_differs_too_little_from_the_start_is_never_in_force(changed, is_in_force):
+    plain = {"OFF": (0.0,) * 3, "SCALE": (1.0,) * 3, "ODIAG": (0.0,) * 3}
+    found = PX4.in_force(held(1, **{**plain, **changed}), 1).correction
+    same = np.array_equal(found.offset, np.zeros(3)) and np.array_equal(found.soft_iron, np.eye(3))
+    assert same is not is_in_force
+
+
+def test_the_zone_was_wider_to_1_13():
+    values = held(1, OFF=(0.0, 0.0, 0.008))
+    assert PX4.in_force(values, 1).correction.offset[2] == pytest.approx(-8.0)
+    old = {**values, "CAL_MAG_ROT_AUTO": 1.0}
+    assert PX4.in_force(old, 1).correction.offset[2] == 0.0
+
+
+def test_a_small_step_is_not_taken_over_but_two_are():
+    parameters = history(
+        (0.0, held(1)), (3.0, {"CAL_MAG0_XOFF": 0.053}), (6.0, {"CAL_MAG0_XOFF": 0.057})
+    )
+    assert [in_force(parameters, t).offset[0] for t in (1.0, 4.0, 7.0)] == pytest.approx(
+        [-50.0, -50.0, -57.0]
+    )
+    assert PX4.changes(parameters, armed=FLIGHT) == (6.0,)
+
+
+def test_a_value_set_in_flight_acts_after_the_next_change_while_disarmed():
+    parameters = history(
+        (0.0, {**held(1, CAL_MAG_COMP_TYP=2.0), "MPC_XY_CRUISE": 4.0}),
+        (20.0, {"CAL_MAG0_XCOMP": 3.0}),
+        (60.0, {"MPC_XY_CRUISE": 5.0}),
+    )
+    assert [in_force(parameters, t).motor.any() for t in (30.0, 55.0, 61.0)] == [False, False, True]
+    assert PX4.changes(parameters, armed=FLIGHT) == (60.0,)
+
+
+def test_the_switch_acts_in_flight():
+    parameters = history((0.0, held(1, COMP=(3.0, 0.0, 0.0))), (20.0, {"CAL_MAG_COMP_TYP": 2.0}))
+    assert [in_force(parameters, t).motor.any() for t in (15.0, 21.0)] == [False, True]
+
+
+@pytest.mark.parametrize("value", [4.0, -1.0, 2.5, 1077936128.0])
+def test_a_switch_that_the_firmware_does_not_know_is_off_and_told(value):
+    values = held(1, CAL_MAG_COMP_TYP=value, COMP=(3.0, 0.0, 0.0))
+    assert PX4.regressor(values) is None
+    assert not PX4.in_force(values, 1).correction.motor.any()
+    assert "which the vehicle takes for 0, off" in PX4.warnings(values)[0]
+
+
+@given(st.lists(st.tuples(st.floats(0.0, 70.0), st.floats(-0.2, 0.2)), max_size=6))
+def test_what_is_in_force_holds_between_its_changes(sets):
+    parameters = history((0.0, held(1)), *((t, {"CAL_MAG0_YOFF": v}) for t, v in sorted(sets)))
+    changes = (-math.inf, *PX4.changes(parameters, armed=FLIGHT), 100.0)
+    for begin, end in itertools.pairwise(changes):
+        middle = 0.5 * (max(begin, -1.0) + end)
+        assert np.array_equal(
+            in_force(parameters, begin).offset, in_force(parameters, middle).offset
+        )
+
+
+# --- what cannot be fitted -----------------------------------------------------------------------
+
+
+def recording(firmware: str, parameters: ParameterHistory) -> Recording:
+    return Recording("f.ulg", Vehicle("px4", "copter", 1, 1, firmware), math.nan, 1.0, {},
+                     parameters, ReadReport(1, 1, 1))  # fmt: skip
+
+
+@pytest.mark.parametrize("firmware", ["1.11.3", "1.6.0", "0.9.1"])
+def test_firmware_before_1_12_is_refused_with_its_version(firmware: str) -> None:
+    with pytest.raises(MissingDataError, match=f"1.12 or newer; instead it is of {firmware}"):
+        PX4.require_fittable(recording(firmware, history((0.0, held(1)))))
+
+
+@pytest.mark.parametrize("firmware", ["1.12.0", "1.15.2", "2.0.0", ""])
+def test_newer_firmware_is_taken(firmware: str) -> None:
+    PX4.require_fittable(recording(firmware, history((0.0, held(1)))))
+
+
+def test_a_recording_without_parameters_is_refused_with_what_to_give() -> None:
+    with pytest.raises(MissingDataError, match=r"holds no parameters: give the \.ulg"):
+        PX4.require_fittable(recording("", ParameterHistory()))
+
+
+@given(numbers, st.sampled_from([math.nan, math.inf]), st.sampled_from(["COMP", "OFF", "SCALE"]))
+def test_a_value_that_is_none_leaves_out_its_own_compass_alone(number, value, kind):
+    bad = vector_names(kind, number)[1]
+    values = {**held(1), **held(2), **held(3), **held(4), bad: value}
+    found = PX4.left_out(history((0.0, values)))
+    assert set(found) == {number}
+    assert isinstance(found[number], ParameterFileError)
+    assert bad in str(found[number])
+
+
+def test_a_compass_without_a_slot_and_one_turned_inside_out_are_left_out():
+    values = {**held(1), **held(2, ODIAG=(1.5, 0.0, 0.0))}
+    found = PX4.left_out(history((0.0, values)))
+    assert set(found) == {2, 3, 4}
+    assert "CAL_MAG2_ID is 0" in str(found[3])
+    assert "CAL_MAG1" in str(found[2])
+
+
+def test_what_a_log_does_not_tell_is_named():
+    values = held(1)
+    del values["CAL_MAG0_ZOFF"]
+    force = PX4.in_force_at(history((0.0, values)), 1, 0.0)
+    assert force.unseen == ("CAL_MAG0_ZOFF",)
+
+
+# --- settings ------------------------------------------------------------------------------------
+
+
+def test_a_compass_has_a_slot_an_id_and_what_its_settings_say():
+    values = {**held(1, CAL_MAG0_PRIO=0.0), **held(3, CAL_MAG2_ROT=6.0), "CAL_MAG2_ID": -5.0}
+    assert PX4.compasses(values) == (
+        Compass(1, 101, False, None, False),
+        Compass(3, 2**32 - 5, True, 6, True),
+    )
+    assert PX4.warnings(values) == ("compass 1 is not used for the heading (CAL_MAG0_PRIO is 0)",)
+
+
+def test_whole_numbers_are_written_as_such():
+    assert [autopilots.integer_type(name) for name in ("CAL_MAG_COMP_TYP", "CAL_MAG3_ID")] == [6, 6]
+    assert all(autopilots.integer_type(n) is None for n in ("CAL_MAG0_XCOMP", "CAL_MAG0_YAW"))
+
+
+def test_a_write_is_followed_by_a_restart():
+    (warning,) = PX4.write_warnings({"CAL_MAG0_XCOMP": 1.0}, {"CAL_MAG_COMP_TYP": 2.0})
+    assert "restart the vehicle" in warning
