@@ -114,7 +114,7 @@ class Watch:
             link_text=self._link_text(vehicle, link.up),
             armed=now.armed,
             elapsed_s=self.elapsed_s,
-            recorded_s=self._tap.seconds,
+            recorded_s=self._tap.seconds(vehicle),
             recording_path=self._tap.path,
             recording_bytes=self._tap.size,
             recording=self._tap.taking and not self._tap.failure,
