@@ -8,11 +8,14 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from magcomp.errors import unforeseen
 from magcomp.link import (
     Connection,
     GapEnded,
     LinkEvent,
     Replay,
+    SinkFailed,
+    StrangerHeard,
     VehicleFound,
     VehicleRebooted,
 )
@@ -70,18 +73,24 @@ class Watch:
         self._gap = (-math.inf, "")
 
     def run(self, stop: threading.Event) -> None:
-        """Watch until stopped."""
+        """Watch until stopped; what goes wrong in one look is told, and the next one follows."""
         while not stop.wait(LOOK_S):
-            for event in self._connection.take_events():
-                self._take(event)
-            vehicle = self._connection.vehicle
-            if vehicle is None:
-                continue
-            now = self._tap.latest.now(vehicle)
-            # By the vehicle's clock: a replay, or a simulation, may be faster than ours.
-            self._situation.update(
-                self._tap.seconds, now.armed, now.attitude, now.height_m, now.speed
-            )
+            try:
+                self._look()
+            except Exception as error:
+                self._note(unforeseen(error))
+
+    def _look(self) -> None:
+        for event in self._connection.take_events():
+            self._take(event)
+        vehicle = self._connection.vehicle
+        if vehicle is None:
+            return
+        now = self._tap.latest.now(vehicle)
+        # By the vehicle's clock: a replay, or a simulation, may be faster than ours.
+        self._situation.update(
+            self._tap.seconds(vehicle), now.armed, now.attitude, now.height_m, now.speed
+        )
 
     @property
     def elapsed_s(self) -> float:
@@ -97,7 +106,7 @@ class Watch:
         now = _NOTHING if vehicle is None else latest.now(vehicle)
         parameters = {} if vehicle is None else latest.parameters(vehicle)
         link, refit = self._connection.statistics(), self._refit()
-        view = self._view(now)
+        view = self._view(now, vehicle)
         return LiveSnapshot(
             address=str(self._connection.address),
             vehicle=vehicle,
@@ -105,7 +114,7 @@ class Watch:
             link_text=self._link_text(vehicle, link.up),
             armed=now.armed,
             elapsed_s=self.elapsed_s,
-            recorded_s=self._tap.seconds,
+            recorded_s=self._tap.seconds(vehicle),
             recording_path=self._tap.path,
             recording_bytes=self._tap.size,
             recording=self._tap.taking and not self._tap.failure,
@@ -139,20 +148,26 @@ class Watch:
                 self._note("the vehicle rebooted")
             case VehicleFound():
                 self._preparation.trouble = ""
+            case StrangerHeard(where=where):
+                self._note(f"somebody else at {where} speaks in the vehicle's name; it is ignored")
+            case SinkFailed(error=error):
+                self._note(f"what arrives cannot be taken any more: {error}")
 
     def _note(self, text: str) -> None:
-        self._notes = [*self._notes[-4:], text]
+        if text not in self._notes[-1:]:
+            self._notes = [*self._notes[-4:], text]
 
-    def _view(self, now: Now) -> View:
+    def _view(self, now: Now, vehicle: Vehicle | None) -> View:
         refit = self._refit()
+        whose = (None, None) if vehicle is None else (vehicle.system, vehicle.component)
         return View(
             situation=self._situation.situation,
             armed=now.armed,
             throttle=now.throttle,
             attitude=now.attitude,
             height_m=now.height_m,
-            coverage=self._tap.buffer.coverage(),
-            seconds=self._tap.seconds,
+            coverage=self._tap.buffer.coverage(*whose),
+            seconds=self._tap.seconds(vehicle),
             grade=None if refit.analysis is None else refit.analysis.grade,
             stable_refits=refit.stable,
             bound_deg=_bound_deg(refit.analysis),
