@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from magcomp import autopilots
+from magcomp.align.low_pass import low_pass
 from magcomp.align.sample import interpolate
 from magcomp.autopilots.protocol import MotorOutputs
 from magcomp.model import (
@@ -192,17 +193,13 @@ def _smoothed(series: Series, constant: float) -> Series:
     """What a first-order low pass of a time constant in seconds makes of columns, (n, k)."""
     if constant <= 0.0:
         return series
-    # SciPy's filters cost a second to import: only where there is something to fit.
-    from scipy.signal import lfilter  # noqa: PLC0415
-
     step = float(np.median(np.diff(series.time)))
     if float(np.ptp(series.time)) > _MOST_ROWS * step:
         return series
     time = np.arange(series.time[0], series.time[-1] + step, step)
     even = interpolate(series, time)
     share = 1.0 - float(np.exp(-step / constant))
-    start = (1.0 - share) * even[:1]
-    smooth, _ = lfilter([share], [1.0, share - 1.0], even, axis=0, zi=start)
+    smooth = low_pass(even, share, even[0])
     return Series(series.time, interpolate(Series(time, smooth), series.time))
 
 
