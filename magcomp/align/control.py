@@ -34,6 +34,7 @@ _CUT_SHARE = 0.1
 _SMOOTHINGS = (0.03, 0.06, 0.1, 0.15, 0.2, 0.3)
 """Time constants in seconds by which a battery monitor may smooth."""
 _STEPS_SEEN = 1.5
+_CLEARLY_SMOOTHED = 0.9
 _MOST_ROWS = 1_000_000
 """More rows in even steps than this mean that the times are not to be trusted."""
 
@@ -148,25 +149,26 @@ def _finer(recording: Recording, duty: Series | None) -> list[tuple[Series, str]
 def _rebuilt(reference: Series, duty: Series, kind: str, name: str) -> list[Control]:
     """The reference regressed on powers of the duty, shape (n, k), sampled more often.
 
-    A battery monitor smooths what it measures. Where the duty is told often enough to see that,
-    the quantity before it was smoothed is a form of its own: a shift in time is not all that lies
-    between the two, and a slope against the smoothed one comes out too large.
+    A battery monitor smooths what it measures. Where the duty is told often enough to show that,
+    the quantity is rebuilt as it was before: more than a shift in time lies between the two, and a
+    slope against the smoothed one comes out too large.
     """
     if len(reference) < _LEAST_ROWS:
         return []
     powers = np.stack([np.mean(duty.value**k, axis=1) for k in (1, 2, 3)], axis=1)
-    found = [_rebuilt_through(reference, Series(duty.time, powers), 0.0, kind, name)]
+    features = Series(duty.time, powers)
+    plain = _rebuilt_through(reference, features, 0.0, kind, name)
+    if plain is None:
+        return []
     step = float(np.median(np.diff(duty.time)))
-    smoothings = [each for each in _SMOOTHINGS if each > _STEPS_SEEN * step > 0.0]
-    if smoothings and found[0] is not None:
-        whole = f"{name} as before its smoothing"
-        forms = [
-            _rebuilt_through(reference, Series(duty.time, powers), each, kind, whole)
-            for each in smoothings
-        ]
-        better = [form for form in forms if form is not None and form[1] < found[0][1]]
-        found.append(min(better, key=lambda form: form[1], default=None))
-    return [form[0] for form in found if form is not None]
+    smoothed = [
+        found
+        for each in _SMOOTHINGS
+        if each > _STEPS_SEEN * step > 0.0
+        and (found := _rebuilt_through(reference, features, each, kind, name)) is not None
+    ]
+    best = min(smoothed, key=lambda found: found[1], default=plain)
+    return [best[0] if best[1] < _CLEARLY_SMOOTHED * plain[1] else plain[0]]
 
 
 def _rebuilt_through(
