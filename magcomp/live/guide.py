@@ -1,47 +1,25 @@
 """What to do next, in words: from what has been seen so far to one sentence. No I/O, no clock.
 
-Situations
-----------
-======== ============================================== =========================================
-GROUND   disarmed, and nothing recorded with motors on  say how to begin
-UNSURE   motors on, still on the ground, not yet known  turn it; no word of throttle
-STILL    motors on, does not turn                       steps of the throttle, *if tied down*
-HELD     motors on, tilted as nobody flies, on the spot turns at steady throttles
-FLYING   has risen or moves over the ground             turn, climb, descend; never a throttle
-======== ============================================== =========================================
+How the recording is being made is told by magcomp.live.situation.
 
 Rules
 -----
 1. A pilot in the air is never told a throttle, a bank or anything else that could cost
    height: only to turn, to climb, to descend when high enough, and to land when it is enough.
-2. Once flying, a vehicle counts as flying until it is disarmed.
-3. Throttle is spoken of only to somebody who holds the vehicle or has tied it down.
+2. Throttle is spoken of only to somebody who holds the vehicle or has tied it down.
+3. Where it is not known whether it flies, only what is right for both is said.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from enum import StrEnum
 
 import numpy as np
 
 from magcomp.buffer import BANDS, LEVELS, SECTORS, Coverage, sphere_cell
+from magcomp.live.situation import Situation, Vector
 from magcomp.model import Grade
-
-Vector = tuple[float, float, float]
-
-RISEN_M = 1.5
-MOVING = 1.5
-"""Metres above where it was armed, and m/s over the ground, that nobody holding it reaches."""
-
-TIPPED_RAD = math.radians(55.0)
-"""A tilt that a multirotor flown for calibration does not have."""
-
-TURNED_RAD = math.radians(30.0)
-"""A vehicle that turns less than this stands still."""
-
-STILL_S = 8.0
 
 LEVEL_ENOUGH = 0.3
 """Share of the sphere at which a level is done: about three turns, one about each axis."""
@@ -60,16 +38,6 @@ _STABLE_REFITS = 2
 FINE_DEG = 0.5
 LONG_S = 240.0
 """A bound that is worth waiting for, and how long."""
-
-
-class Situation(StrEnum):
-    """How the recording is being made; see the table at the top of the file."""
-
-    GROUND = "ground"
-    UNSURE = "unsure"
-    STILL = "still"
-    HELD = "held"
-    FLYING = "flying"
 
 
 @dataclass(frozen=True)
@@ -98,7 +66,7 @@ class View:
     Attributes
     ----------
     situation
-        See :class:`SituationWatch`.
+        See magcomp.live.situation.
     armed
         None while unknown.
     throttle
@@ -131,73 +99,16 @@ class View:
     bound_deg: float = 0.0
 
 
-class SituationWatch:
-    """Tells a vehicle that flies from one that is held or tied down.
-
-    Fed with what the vehicle says, a few times a second.
-    """
-
-    def __init__(self) -> None:
-        self.situation = Situation.GROUND
-        self._ground_m: float | None = None
-        self._tipped = False
-        self._armed_at: float | None = None
-        self._reference: Vector | None = None
-        self._turned = False
-
-    def update(
-        self,
-        now: float,
-        armed: bool | None,
-        attitude: Vector | None,
-        height_m: float | None,
-        speed: float | None,
-    ) -> Situation:
-        """Take one look; ``now`` in seconds."""
-        if not armed:
-            self._rest(height_m)
-            return self.situation
-        if self._armed_at is None:
-            self._armed_at, self._reference, self._turned = now, attitude, False
-        self._ground_m = height_m if self._ground_m is None else self._ground_m
-        if self.situation is Situation.FLYING or self._is_flying(height_m, speed):
-            self.situation = Situation.FLYING
-            return self.situation
-        self._look(attitude)
-        if self._tipped:
-            self.situation = Situation.HELD
-        elif self._turned or now - self._armed_at < STILL_S:
-            self.situation = Situation.UNSURE
-        else:
-            self.situation = Situation.STILL
-        return self.situation
-
-    def _rest(self, height_m: float | None) -> None:
-        self._ground_m = height_m
-        if self._armed_at is None:
-            return
-        self._armed_at = None
-        if self.situation is Situation.UNSURE:
-            self.situation = Situation.GROUND
-
-    def _is_flying(self, height_m: float | None, speed: float | None) -> bool:
-        risen = None not in (height_m, self._ground_m) and (
-            (height_m or 0.0) - (self._ground_m or 0.0) > RISEN_M
-        )
-        return risen or (speed is not None and speed > MOVING)
-
-    def _look(self, attitude: Vector | None) -> None:
-        if attitude is None:
-            return
-        if self._reference is None:
-            self._reference = attitude
-        turned = (
-            abs(math.remainder(new - old, math.tau))
-            for new, old in zip(attitude, self._reference, strict=True)
-        )
-        self._turned = self._turned or max(turned) > TURNED_RAD
-        tilt = math.acos(math.cos(attitude[0]) * math.cos(attitude[1]))
-        self._tipped = self._tipped or tilt > TIPPED_RAD
+__all__ = [
+    "Guidance",
+    "Situation",
+    "View",
+    "guide",
+    "is_settled",
+    "level_seconds",
+    "levels_done",
+    "pilot_is_done",
+]
 
 
 def guide(view: View) -> Guidance:
@@ -215,7 +126,7 @@ def guide(view: View) -> Guidance:
         case Situation.STILL:
             return _guide_still(view)
         case Situation.UNSURE:
-            return Guidance(f"keep the throttle as it is and {_turn(view)}", 0.0)
+            return _guide_unsure(view)
         case _:
             return _guide_ground(view)
 
@@ -236,7 +147,7 @@ def pilot_is_done(situation: Situation, disarmed_s: float, levels: int) -> bool:
     levels
         How many throttle levels are done.
     """
-    if disarmed_s < DISARMED_S or situation in (Situation.GROUND, Situation.UNSURE):
+    if disarmed_s < DISARMED_S or situation is Situation.GROUND:
         return False
     # Whoever holds it may switch the motors off to turn it over, and goes on.
     return situation is not Situation.HELD or levels >= LEVELS_ENOUGH
@@ -260,6 +171,18 @@ def _guide_ground(view: View) -> Guidance:
         "turn it about every axis at three steady throttles",
         0.0,
     )
+
+
+def _guide_unsure(view: View) -> Guidance:
+    """It may hover, or hang on a stand: only what is right for both."""
+    shares = (
+        min(len(_sectors(view)) / SECTORS_ENOUGH, 1.0),
+        min(view.seconds / FLIGHT_S, 1.0),
+        min(view.stable_refits / _STABLE_REFITS, 1.0) if view.grade is Grade.GOOD else 0.0,
+    )
+    if min(shares) >= 1.0 and is_settled(view):
+        return Guidance("that is enough: land, or rest, and disarm to write", 1.0, enough=True)
+    return Guidance(f"keep the throttle as it is and {_turn(view)}", 0.9 * float(np.mean(shares)))
 
 
 # -------------------------------------------------------------------------- flying

@@ -22,7 +22,6 @@ from magcomp.link import (
 from magcomp.link.clock import Clock
 from magcomp.live.guide import (
     Guidance,
-    SituationWatch,
     View,
     guide,
     level_seconds,
@@ -31,6 +30,7 @@ from magcomp.live.guide import (
 from magcomp.live.latest import Now
 from magcomp.live.prepare import Preparation
 from magcomp.live.refit import Refit
+from magcomp.live.situation import Look, Manoeuvre, SituationWatch
 from magcomp.live.snapshot import LiveSnapshot, compasses_now, warnings
 from magcomp.live.tap import Tap
 from magcomp.model import Analysis, Grade, Vehicle
@@ -72,6 +72,15 @@ class Watch:
         self._notes: list[str] = []
         self._gap = (-math.inf, "")
 
+    @property
+    def manoeuvre(self) -> Manoeuvre | None:
+        """What the user says that is being done; may be set at any time."""
+        return self._situation.manoeuvre
+
+    @manoeuvre.setter
+    def manoeuvre(self, said: Manoeuvre | None) -> None:
+        self._situation.manoeuvre = said
+
     def run(self, stop: threading.Event) -> None:
         """Watch until stopped; what goes wrong in one look is told, and the next one follows."""
         while not stop.wait(LOOK_S):
@@ -88,9 +97,8 @@ class Watch:
             return
         now = self._tap.latest.now(vehicle)
         # By the vehicle's clock: a replay, or a simulation, may be faster than ours.
-        self._situation.update(
-            self._tap.seconds(vehicle), now.armed, now.attitude, now.height_m, now.speed
-        )
+        seconds = self._tap.seconds(vehicle)
+        self._situation.update(Look(seconds, now.armed, now.attitude, now.height_m, now.accel))
 
     @property
     def elapsed_s(self) -> float:
