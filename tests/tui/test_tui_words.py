@@ -96,6 +96,8 @@ def test_a_terminal_without_unicode_gets_as_many_cells_of_ascii(text):
         ("utf-8", {"LANG": "en_GB.UTF-8"}, False),
         ("utf-8", {}, False),
         ("utf-8", {"LANG": "C"}, True),
+        ("utf-8", {"LANG": "C", "LC_CTYPE": "C.UTF-8"}, True),
+        ("utf-8", {"LANG": "C", "LC_CTYPE": "en_GB.UTF-8"}, False),
         ("utf-8", {"LANG": "C", "LC_ALL": "C.UTF-8"}, False),
         ("ascii", {"LANG": "en_GB.UTF-8"}, True),
         ("ANSI_X3.4-1968", {}, True),
