@@ -338,6 +338,7 @@ def _notes(
         yield "the log holds no position: the earth's field is taken from the readings themselves"
     yield from multiplied_notes(recording, chosen)
     autopilot = autopilots.of(recording)
+    yield from autopilot.reading_notes(recording)
     yield from autopilot.warnings(recording.parameters.latest)
     for compass, why in sorted(autopilot.left_out(recording.parameters).items()):
         if compass in recording.field and wanted.compass is None:

@@ -129,6 +129,14 @@ class ArduPilot:
         """
         return FieldMeaning(truncated=True, applied_later_s=0.05)
 
+    def from_telemetry(
+        self,
+        told: Mapping[int, Series],
+        values: Mapping[str, float],  # noqa: ARG002
+    ) -> tuple[Mapping[int, Series], frozenset[int]]:
+        """The messages are of compass priority 1, 2, 3, corrected and in body axes."""
+        return told, frozenset()
+
     def lag_priors(self, source_format: str) -> LagPriors:
         """The dataflash log stamps a reading where it is made, a link where it is sent."""
         return _LOGGED if source_format == "dataflash" else _LINK
@@ -301,6 +309,10 @@ class ArduPilot:
         """A bit of LOG_BITMASK for its own log, a message for telemetry."""
         asked = _LOG_BITS if source_format == "dataflash" else _LINK_MESSAGES
         return asked[quantity]
+
+    def reading_notes(self, recording: Recording) -> tuple[str, ...]:  # noqa: ARG002
+        """None: the messages say what they are."""
+        return ()
 
     def no_compass_hint(self) -> str:
         """The switch of all compasses, and the message of the first."""

@@ -220,6 +220,25 @@ class Autopilot(Protocol):
         """What the readings of a source are, by ``Recording.format``."""
         ...
 
+    def from_telemetry(
+        self, told: Mapping[int, Series], values: Mapping[str, float]
+    ) -> tuple[Mapping[int, Series], frozenset[int]]:
+        """The compasses of telemetry, whose messages need not mean the same in each firmware.
+
+        Parameters
+        ----------
+        told
+            What the first, second and third message of compass readings hold, mGauss, (n, 3).
+
+        Returns
+        -------
+        fields
+            By compass number, in body axes.
+        raw
+            Those of them whose readings are the sensor's own.
+        """
+        ...
+
     def lag_priors(self, source_format: str) -> LagPriors:
         """What is known of the lags beforehand, by ``Recording.format``."""
         ...
@@ -383,6 +402,10 @@ class Autopilot(Protocol):
         source_format
             As in ``Recording.format``.
         """
+        ...
+
+    def reading_notes(self, recording: Recording) -> tuple[str, ...]:
+        """What a user must know of how the readings were understood, a sentence each."""
         ...
 
     def no_compass_hint(self) -> str:

@@ -41,6 +41,7 @@ from magcomp.autopilots.px4_names import (
 )
 from magcomp.autopilots.px4_rotation import sensor_to_body
 from magcomp.autopilots.px4_settings import NUMBERS
+from magcomp.autopilots.px4_telemetry import by_slot
 from magcomp.errors import InputError, MissingDataError
 from magcomp.model import (
     CURRENT,
@@ -126,6 +127,13 @@ class Px4:
     def field_meaning(self, source_format: str) -> FieldMeaning:
         """On the link whole mGauss, in the log floats."""
         return FieldMeaning(truncated=source_format != "ulog", applied_later_s=0.0)
+
+    def from_telemetry(
+        self, told: Mapping[int, Series], values: Mapping[str, float]
+    ) -> tuple[Mapping[int, Series], frozenset[int]]:
+        """The sensors' own fields, turned into body axes; none while no slot is known."""
+        found = by_slot(told, values)
+        return found, frozenset(found)
 
     def lag_priors(self, source_format: str) -> LagPriors:
         """The log stamps a reading with the mean time of what it is made of."""
@@ -271,6 +279,16 @@ class Px4:
         """A bit of SDLOG_PROFILE; telemetry as it is sends too little of everything."""
         asked = _LOG_BITS if source_format == "ulog" else _LINK_MESSAGES
         return asked[quantity]
+
+    def reading_notes(self, recording: Recording) -> tuple[str, ...]:
+        """Of telemetry that does not say which compass is which."""
+        if recording.format == "ulog" or len(recording.field) < 2:
+            return ()
+        named = ", ".join(single_name("ID", number) for number in sorted(recording.field))
+        return (
+            "telemetry does not say which compass is which: its messages are taken for "
+            f"{named} by how well each calibration fits; {_OWN_LOG} to be sure",
+        )
 
     def no_compass_hint(self) -> str:
         """Telemetry sends no compass by itself."""

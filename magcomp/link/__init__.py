@@ -18,6 +18,7 @@ from magcomp.link.events import (
     GapStarted,
     LinkEvent,
     SinkFailed,
+    StrangerHeard,
     VehicleFound,
     VehicleRebooted,
 )
@@ -42,6 +43,7 @@ __all__ = [
     "SerialLine",
     "SerialPort",
     "SinkFailed",
+    "StrangerHeard",
     "StreamReport",
     "TcpClient",
     "TcpServer",

@@ -86,6 +86,7 @@ class Connection:
         self._inbox: deque[Message] = deque(maxlen=_INBOX)
         self._events: deque[LinkEvent] = deque(maxlen=_EVENTS)
         self._changed = threading.Condition()
+        self._writing = threading.Lock()
         self._stop = threading.Event()
         self._ended = False
         self._failure: BaseException | None = None
@@ -132,6 +133,12 @@ class Connection:
         with self._changed:
             self._changed.wait_for(self._vehicle_clear, timeout)
             self._raise_failure()
+            if self._state.has_twin and self._state.ambiguous():
+                raise LinkError(
+                    f"One vehicle of a number must be on {self.address}; instead two at different "
+                    f"addresses say that they are system {self._state.heartbeats[0].system}. "
+                    "Give one of them another number, or switch it off."
+                )
             if self._state.ambiguous():
                 systems = " and ".join(
                     f"{h.system} ({h.autopilot} {h.kind})" for h in self._state.heartbeats
@@ -155,11 +162,10 @@ class Connection:
         LinkError
             The connection was closed.
         """
-        with self._changed:
-            if self._stop.is_set():
-                raise LinkError(f"The connection to {self.address} is closed.")
-            self._raise_failure()
-            self._write(message)
+        if self._stop.is_set():
+            raise LinkError(f"The connection to {self.address} is closed.")
+        self._raise_failure()
+        self._write(message)
 
     def receive(self, timeout: float) -> Message | None:
         """Give the vehicle's next message, or None when none came within ``timeout`` seconds.
@@ -227,7 +233,7 @@ class Connection:
     # ---------------------------------------------------------------- how it goes
 
     def statistics(self) -> LinkStatistics:
-        """Losses, rates, round trip and gaps up to now."""
+        """Losses, rates, round trip and gaps up to now; never waits for a slow link or disk."""
         with self._changed:
             return self._state.statistics(self._now(), reopened=self._reopened, unsent=self._unsent)
 
@@ -275,23 +281,35 @@ class Connection:
             self._reopen("silence")
 
     def _pump(self, data: bytes) -> None:
+        # Disk and line may be slow, so neither is waited for while others need the state.
         with self._changed:
             now, unix_us = self._now(), self._transport.clock.unix_us()
-            for received in self._state.receive(data, now):
-                self._events.extend(self._sinks.add(unix_us, received.frame.raw, now))
-                if received.from_vehicle:
-                    self._inbox.append(received.frame.message)
-            for message in self._state.due(now):
-                self._write(message)
+            taken = self._state.receive(data, now, self._transport.peer)
+            due = self._state.due(now)
+            self._transport.keep_to(self._state.peer)
+        failed = [
+            event
+            for received in taken
+            if not received.from_stranger
+            for event in self._sinks.add(unix_us, received.frame.raw, now)
+        ]
+        with self._changed:
+            self._inbox.extend(each.frame.message for each in taken if each.from_vehicle)
+            self._events.extend(failed)
             self._events.extend(self._state.take_events())
             self._changed.notify_all()
+        for message in due:
+            self._write(message)
 
     def _write(self, message: Message) -> None:
-        raw = self._state.pack(message, self._transport.clock.unix_us())
-        try:
-            self._transport.write(raw)
-        except TransportClosedError:
-            self._unsent += 1  # the reading thread notices and opens it again
+        with self._writing:  # frames are numbered and signed in the order in which they are sent
+            with self._changed:
+                transport = self._transport
+                raw = self._state.pack(message, transport.clock.unix_us())
+            try:
+                transport.write(raw)
+            except TransportClosedError:
+                self._unsent += 1  # the reading thread notices and opens it again
 
     def _stalled(self) -> bool:
         """Tell whether a connected transport may be dead without knowing it."""

@@ -1,21 +1,13 @@
 """What to do next, in words: from what has been seen so far to one sentence. No I/O, no clock.
 
-Situations
-----------
-======== ============================================== =========================================
-GROUND   disarmed, and nothing recorded with motors on  say how to begin
-UNSURE   motors on, still on the ground, not yet known  turn it; no word of throttle
-STILL    motors on, does not turn                       steps of the throttle, *if tied down*
-HELD     motors on, tilted as nobody flies, on the spot turns at steady throttles
-FLYING   has risen or moves over the ground             turn, climb, descend; never a throttle
-======== ============================================== =========================================
+How the recording is being made is told by magcomp.live.situation.
 
 Rules
 -----
 1. A pilot in the air is never told a throttle, a bank or anything else that could cost
    height: only to turn, to climb, to descend when high enough, and to land when it is enough.
-2. Once flying, a vehicle counts as flying until it is disarmed.
-3. Throttle is spoken of only to somebody who holds the vehicle or has tied it down.
+2. Throttle is spoken of only to somebody who holds the vehicle or has tied it down.
+3. Where it is not known whether it flies, only what is right for both is said.
 """
 
 from __future__ import annotations
@@ -78,7 +70,7 @@ class View:
     Attributes
     ----------
     situation
-        See :class:`magcomp.live.situation.SituationWatch`.
+        See magcomp.live.situation.
     armed
         None while unknown.
     throttle
@@ -114,6 +106,19 @@ class View:
     was_enough: bool = False
 
 
+__all__ = [
+    "Guidance",
+    "Situation",
+    "View",
+    "guide",
+    "is_settled",
+    "level_seconds",
+    "levels_done",
+    "pilot_is_done",
+    "wanted_heading",
+]
+
+
 def guide(view: View) -> Guidance:
     """Say what to do next.
 
@@ -131,7 +136,7 @@ def guide(view: View) -> Guidance:
         case Situation.STILL:
             return _guide_still(view)
         case Situation.UNSURE:
-            return Guidance(f"keep the throttle as it is and {_turn(view)}", 0.0)
+            return _guide_unsure(view)
         case _:
             return _guide_ground(view)
 
@@ -152,7 +157,7 @@ def pilot_is_done(situation: Situation, disarmed_s: float, levels: int) -> bool:
     levels
         How many throttle levels are done.
     """
-    if disarmed_s < DISARMED_S or situation in (Situation.GROUND, Situation.UNSURE):
+    if disarmed_s < DISARMED_S or situation is Situation.GROUND:
         return False
     # Whoever holds it may switch the motors off to turn it over, and goes on.
     return situation is not Situation.HELD or levels >= LEVELS_ENOUGH
@@ -176,6 +181,20 @@ def _guide_ground(view: View) -> Guidance:
         "turn it about every axis at three steady throttles",
         0.0,
     )
+
+
+def _guide_unsure(view: View) -> Guidance:
+    """It may hover, or hang on a stand: only what is right for both."""
+    shares = {
+        "headings": min(len(_sectors(view)) / SECTORS_ENOUGH, 1.0),
+        "time": min(view.seconds / FLIGHT_S, 1.0),
+        "a steady answer": _steadiness(view) if view.grade is Grade.GOOD else 0.0,
+    }
+    missing = _missing(shares)
+    if not missing and is_settled(view):
+        return Guidance(_ending(view), 1.0, enough=True)
+    share = 0.9 * float(np.mean(list(shares.values())))
+    return Guidance(f"keep the throttle as it is and {_turn(view)}", share, missing=missing)
 
 
 # -------------------------------------------------------------------------- flying
@@ -309,6 +328,8 @@ def _ending(view: View) -> str:
         return "that is enough"
     if view.situation is Situation.FLYING:
         return "that is enough: land and disarm to write"
+    if view.situation is Situation.UNSURE:
+        return "that is enough: land, or rest, and disarm to write"
     return "that is enough: lower the throttle and disarm to write"
 
 

@@ -28,6 +28,7 @@ from magcomp.link.clock import Clock, SystemClock
 from magcomp.live.latest import Latest
 from magcomp.live.prepare import Preparation
 from magcomp.live.refit import DEFAULT_SHARE, Refit, Refitter
+from magcomp.live.situation import Manoeuvre
 from magcomp.live.snapshot import LiveSnapshot
 from magcomp.live.tap import Tap
 from magcomp.live.upload import finish_restore, make_plan, read_backup, wait_disarmed, write_plan
@@ -222,6 +223,15 @@ class LiveSession:
     def elapsed_s(self) -> float:
         """Seconds since the session was opened; of the log, where one is replayed."""
         return self._watch.elapsed_s
+
+    @property
+    def manoeuvre(self) -> Manoeuvre | None:
+        """What the user says that is being done, None to find out; may be set at any time."""
+        return self._watch.manoeuvre
+
+    @manoeuvre.setter
+    def manoeuvre(self, said: Manoeuvre | None) -> None:
+        self._watch.manoeuvre = said
 
     @property
     def armed(self) -> bool | None:

@@ -8,11 +8,14 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from magcomp.errors import unforeseen
 from magcomp.link import (
     Connection,
     GapEnded,
     LinkEvent,
     Replay,
+    SinkFailed,
+    StrangerHeard,
     VehicleFound,
     VehicleRebooted,
 )
@@ -29,7 +32,7 @@ from magcomp.live.latest import Now
 from magcomp.live.prepare import Preparation
 from magcomp.live.progress import Enough, HeadingRing, HoverBound
 from magcomp.live.refit import Refit
-from magcomp.live.situation import SituationWatch
+from magcomp.live.situation import Look, Manoeuvre, SituationWatch
 from magcomp.live.snapshot import LiveSnapshot, compasses_now, warnings
 from magcomp.live.tap import Tap
 from magcomp.model import CURRENT, THROTTLE, Analysis, Grade, Vehicle
@@ -74,22 +77,36 @@ class Watch:
         self._notes: list[str] = []
         self._gap = (-math.inf, "")
 
+    @property
+    def manoeuvre(self) -> Manoeuvre | None:
+        """What the user says that is being done; may be set at any time."""
+        return self._situation.manoeuvre
+
+    @manoeuvre.setter
+    def manoeuvre(self, said: Manoeuvre | None) -> None:
+        self._situation.manoeuvre = said
+
     def run(self, stop: threading.Event) -> None:
-        """Watch until stopped."""
+        """Watch until stopped; what goes wrong in one look is told, and the next one follows."""
         while not stop.wait(LOOK_S):
-            for event in self._connection.take_events():
-                self._take(event)
-            vehicle = self._connection.vehicle
-            if vehicle is None:
-                continue
-            now = self._tap.latest.now(vehicle)
-            # By the vehicle's clock: a replay, or a simulation, may be faster than ours.
-            self._situation.update(
-                self._tap.seconds, now.armed, now.attitude, now.height_m, now.speed
-            )
-            self._ring.look(now.armed, now.attitude, now.throttle)
-            loads = {CURRENT: now.current, THROTTLE: now.throttle}
-            self._hover.look(now.armed, loads, self._refit().analysis)
+            try:
+                self._look()
+            except Exception as error:
+                self._note(unforeseen(error))
+
+    def _look(self) -> None:
+        for event in self._connection.take_events():
+            self._take(event)
+        vehicle = self._connection.vehicle
+        if vehicle is None:
+            return
+        now = self._tap.latest.now(vehicle)
+        # By the vehicle's clock: a replay, or a simulation, may be faster than ours.
+        seconds = self._tap.seconds(vehicle)
+        self._situation.update(Look(seconds, now.armed, now.attitude, now.height_m, now.accel))
+        self._ring.look(now.armed, now.attitude, now.throttle)
+        loads = {CURRENT: now.current, THROTTLE: now.throttle}
+        self._hover.look(now.armed, loads, self._refit().analysis)
 
     @property
     def elapsed_s(self) -> float:
@@ -105,7 +122,7 @@ class Watch:
         now = _NOTHING if vehicle is None else latest.now(vehicle)
         parameters = {} if vehicle is None else latest.parameters(vehicle)
         link, refit = self._connection.statistics(), self._refit()
-        view = self._view(now)
+        view = self._view(now, vehicle)
         return LiveSnapshot(
             address=str(self._connection.address),
             vehicle=vehicle,
@@ -113,7 +130,7 @@ class Watch:
             link_text=self._link_text(vehicle, link.up),
             armed=now.armed,
             elapsed_s=self.elapsed_s,
-            recorded_s=self._tap.seconds,
+            recorded_s=self._tap.seconds(vehicle),
             recording_path=self._tap.path,
             recording_bytes=self._tap.size,
             recording=self._tap.taking and not self._tap.failure,
@@ -150,20 +167,26 @@ class Watch:
                 self._note("the vehicle rebooted")
             case VehicleFound():
                 self._preparation.trouble = ""
+            case StrangerHeard(where=where):
+                self._note(f"somebody else at {where} speaks in the vehicle's name; it is ignored")
+            case SinkFailed(error=error):
+                self._note(f"what arrives cannot be taken any more: {error}")
 
     def _note(self, text: str) -> None:
-        self._notes = [*self._notes[-4:], text]
+        if text not in self._notes[-1:]:
+            self._notes = [*self._notes[-4:], text]
 
-    def _view(self, now: Now) -> View:
+    def _view(self, now: Now, vehicle: Vehicle | None) -> View:
         refit = self._refit()
+        whose = (None, None) if vehicle is None else (vehicle.system, vehicle.component)
         return View(
             situation=self._situation.situation,
             armed=now.armed,
             throttle=now.throttle,
             attitude=now.attitude,
             height_m=now.height_m,
-            coverage=self._tap.buffer.coverage(),
-            seconds=self._tap.seconds,
+            coverage=self._tap.buffer.coverage(*whose),
+            seconds=self._tap.seconds(vehicle),
             grade=None if refit.analysis is None else refit.analysis.grade,
             stable_refits=refit.stable,
             bound_deg=_bound_deg(refit.analysis),

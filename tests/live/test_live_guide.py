@@ -20,7 +20,7 @@ from magcomp.live.guide import (
     pilot_is_done,
     wanted_heading,
 )
-from magcomp.live.situation import STILL_S, Situation, SituationWatch
+from magcomp.live.situation import Situation
 from magcomp.model import Grade
 
 CELLS = BANDS * SECTORS
@@ -50,51 +50,6 @@ def view(situation, **changes):
         seconds=0.0,
     )
     return replace(start, **changes)
-
-
-def watched(*looks, seconds=STILL_S + 1.0):
-    """Situation after looks of (armed, attitude, height, speed), spread over ``seconds``."""
-    watch = SituationWatch()
-    for index, look in enumerate(looks):
-        watch.update(index * seconds / max(len(looks) - 1, 1), *look)
-    return watch.situation
-
-
-# ---------------------------------------------------------------- which situation
-
-
-def test_a_disarmed_vehicle_is_on_the_ground_however_it_is_turned():
-    assert watched((False, (1.5, 0, 0), 0.0, 0.0), (False, LEVEL, 0.0, 0.0)) is Situation.GROUND
-
-
-def test_a_vehicle_that_rises_flies_and_goes_on_flying_when_it_comes_down():
-    ground, up = (True, LEVEL, 100.0, 0.0), (True, LEVEL, 103.0, 0.0)
-    assert watched((False, LEVEL, 100.0, 0.0), ground, up) is Situation.FLYING
-    assert watched((False, LEVEL, 100.0, 0.0), ground, up, ground) is Situation.FLYING
-
-
-def test_a_vehicle_that_moves_over_the_ground_flies_even_without_a_height():
-    assert watched((True, LEVEL, None, 0.1), (True, LEVEL, None, 3.0)) is Situation.FLYING
-
-
-def test_a_vehicle_tipped_over_on_the_spot_is_held():
-    assert watched((True, LEVEL, 0.0, 0.0), (True, (2.0, 0.0, 0.0), 0.2, 0.0)) is Situation.HELD
-
-
-def test_a_vehicle_that_only_turns_level_may_be_hovering_low():
-    turned = (True, (0.0, 0.0, 1.5), 0.5, 0.3)
-    assert watched((True, LEVEL, 0.0, 0.0), turned) is Situation.UNSURE
-
-
-def test_a_vehicle_that_does_not_move_for_long_stands_still():
-    looks = [(True, (0.01, 0.0, 0.02), 0.0, 0.0)] * 5
-    assert watched(*looks) is Situation.STILL
-    assert watched(*looks, seconds=STILL_S - 1.0) is Situation.UNSURE
-
-
-def test_yaw_that_wraps_is_no_turn():
-    near = [(True, (0.0, 0.0, yaw), 0.0, 0.0) for yaw in (math.pi - 0.05, -math.pi + 0.05)]
-    assert watched(*near) is Situation.STILL
 
 
 # ---------------------------------------------------------------- what is said
@@ -241,11 +196,20 @@ def test_seconds_and_levels_follow_the_coverage():
         (Situation.HELD, 5.0, 1, False),
         (Situation.HELD, 5.0, 3, True),
         (Situation.GROUND, 99.0, 9, False),
-        (Situation.UNSURE, 99.0, 9, False),
+        (Situation.UNSURE, 99.0, 0, True),
+        (Situation.UNSURE, 1.0, 0, False),
     ],
 )
 def test_disarming_ends_what_has_begun(situation, disarmed_s, levels, done):
     assert pilot_is_done(situation, disarmed_s, levels) is done
+
+
+def test_where_nobody_knows_whether_it_flies_a_good_answer_ends_it_too():
+    seen = coverage(l3=headings(range(SECTORS)))
+    unsure = view(Situation.UNSURE, coverage=seen, seconds=90.0, grade=Grade.GOOD, stable_refits=2)
+    assert guide(unsure).enough
+    assert not guide(replace(unsure, seconds=30.0)).enough
+    assert not guide(replace(unsure, stable_refits=0)).enough
 
 
 # ---------------------------------------------------------------- what is never said
