@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from magcomp import autopilots
+from magcomp.align.low_pass import low_pass
 from magcomp.align.sample import interpolate
 from magcomp.autopilots.protocol import MotorOutputs
 from magcomp.model import (
@@ -37,7 +38,6 @@ _SMOOTHINGS = (0.03, 0.06, 0.1, 0.15, 0.2, 0.3)
 """Time constants in seconds by which a battery monitor may smooth."""
 _STEPS_SEEN = 1.5
 _CLEARLY_SMOOTHED = 0.9
-_MEMORY = 8.0
 """Time constants after which a smoothed quantity has forgotten."""
 _MOST_ROWS = 1_000_000
 """More rows in even steps than this mean that the times are not to be trusted."""
@@ -218,10 +218,8 @@ def _smoothed(series: Series, constant: float) -> Series:
         return series
     time = np.arange(series.time[0], series.time[-1] + step, step)
     even = interpolate(series, time)
-    weight = np.exp(-np.arange(0.0, _MEMORY * constant + step, step) / constant)
-    weight /= weight.sum()
-    before = np.concatenate([np.repeat(even[:1], len(weight) - 1, axis=0), even])
-    smooth = np.stack([np.convolve(column, weight, "valid") for column in before.T], axis=1)
+    share = 1.0 - float(np.exp(-step / constant))
+    smooth = low_pass(even, share, even[0])
     return Series(series.time, interpolate(Series(time, smooth), series.time))
 
 
