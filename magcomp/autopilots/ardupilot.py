@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -211,16 +211,20 @@ class ArduPilot:
         """Every parameter acts at once, armed or not."""
         return in_force(calibration(values, compass))
 
-    def in_force_at(
+    def in_force_at(self, parameters: ParameterHistory, compass: int, time: float) -> InForce:
+        """Every parameter acts from its report, armed or not."""
+        return in_force(calibration_at(parameters, compass, time), unseen(parameters, compass))
+
+    def in_force_over(
         self,
         parameters: ParameterHistory,
         compass: int,
-        time: float,
+        times: Sequence[float],
         *,
-        armed: Series | None = None,  # noqa: ARG002
-    ) -> InForce:
-        """Every parameter acts from its report, armed or not."""
-        return in_force(calibration_at(parameters, compass, time), unseen(parameters, compass))
+        armed: Series | None,  # noqa: ARG002
+    ) -> tuple[InForce, ...]:
+        """Armed or not."""
+        return tuple(self.in_force_at(parameters, compass, time) for time in times)
 
     def regressor(self, values: Mapping[str, float]) -> str | None:
         """COMPASS_MOTCT serves all compasses."""

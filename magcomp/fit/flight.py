@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from magcomp.align import sample, within
+from magcomp.align.low_pass import low_pass
 from magcomp.earth import EarthField
 from magcomp.fit.robust import ROUNDS, Estimate, Prior, solve, time_blocks
 from magcomp.model import (
@@ -335,15 +336,12 @@ def _leaning(samples: Samples) -> FloatArray:
     A multirotor accelerates where it leans, and its attitude filter takes the acceleration for
     gravity within a few seconds.
     """
-    # SciPy's filters cost a second to import: only where there is something to fit.
-    from scipy.signal import lfilter  # noqa: PLC0415
-
     if len(samples) < 2:
         return np.zeros((len(samples), 2))
     step = max(float(np.median(np.diff(samples.time))), 1e-3)
     share = step / (LEAN_S + step)
     tilt = samples.attitude[:, :2] - np.median(samples.attitude[:, :2], axis=0)
-    return np.asarray(lfilter([share], [1.0, share - 1.0], tilt, axis=0))
+    return low_pass(tilt, share)
 
 
 def vertical_of(parameters: FloatArray) -> float:

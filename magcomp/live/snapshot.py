@@ -14,9 +14,11 @@ from magcomp.autopilots import Autopilot
 from magcomp.buffer import Coverage
 from magcomp.geometry import heading
 from magcomp.link import LinkStatistics
-from magcomp.live.guide import Guidance, Situation
+from magcomp.live.guide import Guidance
 from magcomp.live.latest import Now, Vector
+from magcomp.live.progress import Bound
 from magcomp.live.refit import Refit
+from magcomp.live.situation import Situation
 from magcomp.model import THROTTLE, Analysis, Grade, InForce, MotorFit, Vehicle
 
 _PLAUSIBLE = (150.0, 900.0)
@@ -101,6 +103,13 @@ class LiveSnapshot:
         Throttle levels (tenths) whose attitudes suffice.
     level_seconds
         Seconds at each throttle level.
+    headings
+        Largest throttle at each heading, 0 … 1; NaN where it was never headed. See
+        :data:`magcomp.live.progress.HEADINGS`.
+    wanted_heading_deg
+        Where to turn next; None where every heading was seen.
+    bound
+        What the newest analysis promises at the hover, and those before it.
     situation, guidance
         What is going on, and what to do next.
     warnings
@@ -140,6 +149,9 @@ class LiveSnapshot:
     coverage: Coverage
     levels_done: tuple[int, ...]
     level_seconds: tuple[float, ...]
+    headings: tuple[float, ...]
+    wanted_heading_deg: float | None
+    bound: Bound | None
     situation: Situation
     guidance: Guidance
     warnings: tuple[str, ...]
