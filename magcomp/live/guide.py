@@ -13,6 +13,7 @@ Rules
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,11 +53,14 @@ class Guidance:
         0 … 1.
     enough
         Nothing more is needed.
+    missing
+        What is, in a word or two each.
     """
 
     text: str
     share_done: float
     enough: bool = False
+    missing: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +89,8 @@ class View:
         Analyses in a row that said the same.
     bound_deg
         Heading error that the newest analysis promises not to be exceeded (95 %), degrees.
+    was_enough
+        It was enough before; data do not become fewer.
     """
 
     situation: Situation
@@ -97,6 +103,7 @@ class View:
     grade: Grade | None = None
     stable_refits: int = 0
     bound_deg: float = 0.0
+    was_enough: bool = False
 
 
 __all__ = [
@@ -108,6 +115,7 @@ __all__ = [
     "level_seconds",
     "levels_done",
     "pilot_is_done",
+    "wanted_heading",
 ]
 
 
@@ -118,6 +126,8 @@ def guide(view: View) -> Guidance:
     -----
     See the rules at the top of the file.
     """
+    if view.was_enough:
+        return Guidance(_ending(view), 1.0, enough=True)
     match view.situation:
         case Situation.FLYING:
             return _guide_flight(view)
@@ -175,14 +185,16 @@ def _guide_ground(view: View) -> Guidance:
 
 def _guide_unsure(view: View) -> Guidance:
     """It may hover, or hang on a stand: only what is right for both."""
-    shares = (
-        min(len(_sectors(view)) / SECTORS_ENOUGH, 1.0),
-        min(view.seconds / FLIGHT_S, 1.0),
-        min(view.stable_refits / _STABLE_REFITS, 1.0) if view.grade is Grade.GOOD else 0.0,
-    )
-    if min(shares) >= 1.0 and is_settled(view):
-        return Guidance("that is enough: land, or rest, and disarm to write", 1.0, enough=True)
-    return Guidance(f"keep the throttle as it is and {_turn(view)}", 0.9 * float(np.mean(shares)))
+    shares = {
+        "headings": min(len(_sectors(view)) / SECTORS_ENOUGH, 1.0),
+        "time": min(view.seconds / FLIGHT_S, 1.0),
+        "a steady answer": _steadiness(view) if view.grade is Grade.GOOD else 0.0,
+    }
+    missing = _missing(shares)
+    if not missing and is_settled(view):
+        return Guidance(_ending(view), 1.0, enough=True)
+    share = 0.9 * float(np.mean(list(shares.values())))
+    return Guidance(f"keep the throttle as it is and {_turn(view)}", share, missing=missing)
 
 
 # -------------------------------------------------------------------------- flying
@@ -191,24 +203,36 @@ def _guide_unsure(view: View) -> Guidance:
 def _guide_flight(view: View) -> Guidance:
     sectors = _sectors(view)
     throttles = sum(seconds >= _THROTTLE_SHARE_S for seconds in level_seconds(view))
-    shares = (
-        min(len(sectors) / SECTORS_ENOUGH, 1.0),
-        min(throttles / THROTTLES_ENOUGH, 1.0),
-        min(view.seconds / FLIGHT_S, 1.0),
-        min(view.stable_refits / _STABLE_REFITS, 1.0) if view.grade is Grade.GOOD else 0.0,
-    )
-    share = float(np.mean(shares))
-    if min(shares) >= 1.0 and is_settled(view):
+    shares = {
+        "headings": min(len(sectors) / SECTORS_ENOUGH, 1.0),
+        "climbs and descents": min(throttles / THROTTLES_ENOUGH, 1.0),
+        "time": min(view.seconds / FLIGHT_S, 1.0),
+        "a steady answer": _steadiness(view) if view.grade is Grade.GOOD else 0.0,
+    }
+    turns, climbs, *_ = shares.values()
+    share = float(np.mean(list(shares.values())))
+    missing = _missing(shares)
+    if not missing and is_settled(view):
         return Guidance(_ending(view), 1.0, enough=True)
     if not view.armed:
-        return Guidance("this flight was not enough: fly once more with turns and climbs", share)
-    if shares[0] < 1.0 and shares[0] <= shares[1]:
-        return Guidance(_turn(view), share)
-    if shares[1] < 1.0:
-        return Guidance(_climb_or_descend(view), share)
-    if shares[0] < 1.0:
-        return Guidance(_turn(view), share)
-    return Guidance(f"keep flying: {_turn_more(view)} and {_climb_or_descend(view)}", share)
+        text = "this flight was not enough: fly once more with turns and climbs"
+    elif turns < 1.0 and turns <= climbs:
+        text = _turn(view)
+    elif climbs < 1.0:
+        text = _climb_or_descend(view)
+    elif turns < 1.0:
+        text = _turn(view)
+    else:
+        text = f"keep flying: {_turn_more(view)} and {_climb_or_descend(view)}"
+    return Guidance(text, share, missing=missing)
+
+
+def _steadiness(view: View) -> float:
+    return min(view.stable_refits / _STABLE_REFITS, 1.0)
+
+
+def _missing(shares: Mapping[str, float]) -> tuple[str, ...]:
+    return tuple(name for name, share in shares.items() if share < 1.0)
 
 
 def _climb_or_descend(view: View) -> str:
@@ -227,20 +251,23 @@ def _guide_held(view: View) -> Guidance:
     fraction = view.coverage.fraction
     done = levels_done(view.coverage)
     best = np.sort(np.minimum(fraction / LEVEL_ENOUGH, 1.0))[::-1][:LEVELS_ENOUGH]
-    share = 0.9 * float(best.sum()) / LEVELS_ENOUGH
-    if len(done) >= LEVELS_ENOUGH:
-        share += 0.1 * min(view.stable_refits / _STABLE_REFITS, 1.0)
-        if is_settled(view):
-            return Guidance(_ending(view), 1.0, enough=True)
+    shares = {
+        "turns at three throttles": float(best.sum()) / LEVELS_ENOUGH,
+        "a steady answer": _steadiness(view) if len(done) >= LEVELS_ENOUGH else 0.0,
+    }
+    turns, steadiness = shares.values()
+    share, missing = 0.9 * turns + 0.1 * steadiness, _missing(shares)
+    if len(done) >= LEVELS_ENOUGH and is_settled(view):
+        return Guidance(_ending(view), 1.0, enough=True)
     level = _level(view)
-    if level in done:
-        wanted = next((each for each in _HELD_LEVELS if each not in done), LEVELS // 2 + 1)
-        if len(done) >= LEVELS_ENOUGH:
-            return Guidance(
-                f"disarm to end, or make it surer: {_throttle_to(wanted, level)}", share
-            )
-        return Guidance(_throttle_to(wanted, level), share)
-    return Guidance(f"hold the throttle and {_held_motion(view, level)}", share)
+    wanted = next((each for each in _HELD_LEVELS if each not in done), LEVELS // 2 + 1)
+    if level not in done:
+        text = f"hold the throttle and {_held_motion(view, level)}"
+    elif len(done) >= LEVELS_ENOUGH:
+        text = f"disarm to end, or make it surer: {_throttle_to(wanted, level)}"
+    else:
+        text = _throttle_to(wanted, level)
+    return Guidance(text, share, missing=missing)
 
 
 def _held_motion(view: View, level: int) -> str:
@@ -266,20 +293,31 @@ def _throttle_to(wanted: int, level: int) -> str:
 def _guide_still(view: View) -> Guidance:
     seconds = level_seconds(view)
     done = [level for level, time in enumerate(seconds) if time >= STEP_S]
-    share = 0.9 * min(len(done) / STEPS_ENOUGH, 1.0)
-    if len(done) >= STEPS_ENOUGH:
-        share += 0.1 * min(view.stable_refits / _STABLE_REFITS, 1.0)
-        if is_settled(view):
-            return Guidance(_ending(view), 1.0, enough=True)
+    shares = {
+        f"{STEPS_ENOUGH} steps of the throttle": min(len(done) / STEPS_ENOUGH, 1.0),
+        "a steady answer": _steadiness(view) if len(done) >= STEPS_ENOUGH else 0.0,
+    }
+    steps, steadiness = shares.values()
+    share, missing = 0.9 * steps + 0.1 * steadiness, _missing(shares)
+    # Who stands still cannot show more than the motors' part: marginal is the best there is.
+    settled = is_settled(view) or view.grade is Grade.MARGINAL
+    if not missing and settled:
+        return Guidance(_ending(view), 1.0, enough=True)
     level = _level(view)
-    if level not in done:
-        return Guidance("hold the throttle where it is", share)
     wanted = next((each for each in range(STEPS_ENOUGH) if each not in done), None)
+    if not view.armed:
+        text = (
+            f"arm and hold {STEPS_ENOUGH} steps of the throttle, only if it is tied down"
+            if wanted is not None
+            else "wait for the answer; every step is held"
+        )
+        return Guidance(text, share, missing=missing)
     if wanted is None:
         wanted = min(done[-1] + 1, LEVELS // 2 + 1) if level < done[-1] else 0
-    if wanted == level:
-        return Guidance("hold the throttle where it is", share)
-    return Guidance(f"only if it is tied down: {_throttle_to(wanted, level)}", share)
+    if level not in done or wanted == level:
+        return Guidance("hold the throttle where it is", share, missing=missing)
+    text = f"only if it is tied down: {_throttle_to(wanted, level)}"
+    return Guidance(text, share, missing=missing)
 
 
 # -------------------------------------------------------------------------- all
@@ -290,6 +328,8 @@ def _ending(view: View) -> str:
         return "that is enough"
     if view.situation is Situation.FLYING:
         return "that is enough: land and disarm to write"
+    if view.situation is Situation.UNSURE:
+        return "that is enough: land, or rest, and disarm to write"
     return "that is enough: lower the throttle and disarm to write"
 
 
@@ -304,19 +344,37 @@ def _sectors(view: View, level: int | None = None) -> set[int]:
 
 
 def _turn(view: View, level: int | None = None) -> str:
-    """Turn towards the nearest direction not yet seen.
+    """Turn towards the nearest direction not yet seen."""
+    if view.attitude is None:
+        return "turn slowly"
+    right, left = _steps_to_missing(view, level)
+    return f"turn slowly to the {'right' if right <= left else 'left'}"
+
+
+def wanted_heading(view: View) -> float | None:
+    """The heading to turn to next, radians; None where every one was seen.
+
+    The sentence of :func:`guide` names the side it lies on.
+    """
+    if view.attitude is None or len(_sectors(view)) == SECTORS:
+        return None
+    right, left = _steps_to_missing(view)
+    turn = right if right <= left else -left
+    return (view.attitude[2] + turn * math.tau / SECTORS) % math.tau
+
+
+def _steps_to_missing(view: View, level: int | None = None) -> tuple[int, int]:
+    """Sectors to turn right, and left, to the nearest one not yet seen.
 
     Notes
     -----
     Turning right by an angle turns the field to the left by it, in body axes: to lower sectors.
     """
-    if view.attitude is None:
-        return "turn slowly"
     missing = set(range(SECTORS)) - _sectors(view, level)
-    here = _sector(view.attitude[2])
+    here = _sector(view.attitude[2]) if view.attitude is not None else 0
     right = next((step for step in range(SECTORS) if (here - step) % SECTORS in missing), 0)
     left = next((step for step in range(SECTORS) if (here + step) % SECTORS in missing), 0)
-    return f"turn slowly to the {'right' if right <= left else 'left'}"
+    return right, left
 
 
 def _turn_more(view: View) -> str:

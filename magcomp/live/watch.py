@@ -26,14 +26,16 @@ from magcomp.live.guide import (
     guide,
     level_seconds,
     levels_done,
+    wanted_heading,
 )
 from magcomp.live.latest import Now
 from magcomp.live.prepare import Preparation
+from magcomp.live.progress import Enough, HeadingRing, HoverBound
 from magcomp.live.refit import Refit
 from magcomp.live.situation import Look, Manoeuvre, SituationWatch
-from magcomp.live.snapshot import LiveSnapshot, compasses_now, warnings
+from magcomp.live.snapshot import LiveSnapshot, compasses_now, slow_streams, warnings
 from magcomp.live.tap import Tap
-from magcomp.model import Analysis, Grade, Vehicle
+from magcomp.model import CURRENT, THROTTLE, Analysis, Grade, Vehicle
 
 LOOK_S = 0.2
 _GAP_TOLD_S = 20.0
@@ -69,7 +71,11 @@ class Watch:
         self._refit = refit
         self._opened = clock.monotonic()
         self._situation = SituationWatch()
+        self._ring = HeadingRing()
+        self._hover = HoverBound()
+        self._enough = Enough()
         self._notes: list[str] = []
+        self._slow = ""
         self._gap = (-math.inf, "")
 
     @property
@@ -99,6 +105,9 @@ class Watch:
         # By the vehicle's clock: a replay, or a simulation, may be faster than ours.
         seconds = self._tap.seconds(vehicle)
         self._situation.update(Look(seconds, now.armed, now.attitude, now.height_m, now.accel))
+        self._ring.look(now.armed, now.attitude, now.throttle)
+        loads = {CURRENT: now.current, THROTTLE: now.throttle}
+        self._hover.look(now.armed, loads, self._refit().analysis)
 
     @property
     def elapsed_s(self) -> float:
@@ -137,6 +146,9 @@ class Watch:
             coverage=view.coverage,
             levels_done=levels_done(view.coverage),
             level_seconds=level_seconds(view),
+            headings=self._ring.best,
+            wanted_heading_deg=_wanted_deg(view),
+            bound=self._hover.bound,
             situation=view.situation,
             guidance=self._guidance(vehicle, view),
             warnings=self._warnings(now, vehicle, parameters),
@@ -179,6 +191,7 @@ class Watch:
             grade=None if refit.analysis is None else refit.analysis.grade,
             stable_refits=refit.stable,
             bound_deg=_bound_deg(refit.analysis),
+            was_enough=self._enough.reached(self._situation.situation),
         )
 
     def _guidance(self, vehicle: Vehicle | None, view: View) -> Guidance:
@@ -186,7 +199,7 @@ class Watch:
             return Guidance("waiting for the vehicle's heartbeat", 0.0)
         if not self._preparation.over.is_set():
             return Guidance("reading the vehicle's calibration", 0.0)
-        return guide(view)
+        return self._enough.look(view.situation, guide(view))
 
     def _link_text(self, vehicle: Vehicle | None, up: bool) -> str:
         if vehicle is None:
@@ -202,7 +215,15 @@ class Watch:
             return ()
         since = self._preparation.streaming_since
         streaming = 0.0 if since is None else self._clock.monotonic() - since
-        found = [*warnings(now, vehicle, parameters, streaming), *reversed(self._notes)]
+        asked, received = self._connection.requested_rates, self._connection.statistics().rates
+        slow = next(slow_streams(asked, received, streaming), "")
+        # The numbers it was first told with: a text that changes all the time is none.
+        self._slow = slow and (self._slow or slow)
+        found = [
+            *warnings(now, vehicle, parameters, streaming),
+            *filter(None, [self._slow]),
+            *reversed(self._notes),
+        ]
         ended, gap = self._gap
         if self._clock.monotonic() - ended < _GAP_TOLD_S:
             found.append(gap)
@@ -222,6 +243,11 @@ def _bound_deg(analysis: Analysis | None) -> float:
         for error in result.verdict.heading_error
     ]
     return max(errors, default=math.inf)
+
+
+def _wanted_deg(view: View) -> float | None:
+    wanted = wanted_heading(view)
+    return None if wanted is None else math.degrees(wanted)
 
 
 def _degrees(now: Now) -> tuple[float, float, float] | None:

@@ -12,12 +12,16 @@ from textual.color import Color
 from textual.filter import LineFilter
 
 _PAIRS = (
-    ("─━═╌┄┈╴╶╸╺╼╾▔▁▂▄", "-"),
-    ("│┃║╎┆┊╷╵╹╻╽╿▏▕▎▍", "|"),
+    ("▁▂▃", "_"),
+    ("▅▆", "="),
+    ("▇", "#"),
+    ("─━═╌╍┄┈╴╶╸╺╼╾▔▄", "-"),
+    ("│┃║╎╏┆┊╷╵╹╻╽╿▏▕▎▍", "|"),
     ("█▓▉▊▋▌▐▀", "#"),
     ("▒", "+"),
     ("░·•◦∙⋅", "."),
     ("●", "*"),
+    ("◇", "?"),
     ("◐◑", "o"),
     ("○", "O"),
     ("✓✔", "v"),
@@ -33,6 +37,7 @@ _PAIRS = (
     ("±", "~"),
     ("…", "."),
 )
+_COERCED = ("C.UTF-8", "C.utf8", "UTF-8")
 _SIGNS = {sign: plain for signs, plain in _PAIRS for sign in signs}
 
 
@@ -44,13 +49,17 @@ def is_ascii_only(encoding: str | None, environment: Mapping[str, str]) -> bool:
     encoding
         Of the stream that is written to.
     environment
-        As ``os.environ``. Python writes UTF-8 under the C locale all the same, so what the locale
-        says of the terminal is read here; no locale at all says nothing.
+        As ``os.environ``. Python writes UTF-8 under the C locale all the same (PEP 538), so what
+        the locale says of the terminal is read here; no locale at all says nothing.
     """
     if (encoding or "").lower() in ("ascii", "us-ascii", "ansi_x3.4-1968"):
         return True
-    names = (environment.get(name, "") for name in ("LC_ALL", "LC_CTYPE", "LANG"))
-    return next((name for name in names if name), "") in ("C", "POSIX")
+    everything, letters, usual = (
+        environment.get(name, "") for name in ("LC_ALL", "LC_CTYPE", "LANG")
+    )
+    if letters in _COERCED:  # set by Python itself, it says nothing of the terminal
+        letters = ""
+    return (everything or letters or usual) in ("C", "POSIX")
 
 
 @lru_cache(4096)

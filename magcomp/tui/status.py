@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from magcomp.live.guide import Situation
+from magcomp.live.situation import Situation
 from magcomp.live.snapshot import LiveSnapshot
 from magcomp.model import Grade
 from magcomp.report import words

@@ -13,13 +13,14 @@ from hypothesis import strategies as st
 
 from magcomp.buffer import BANDS, LEVELS, SECTORS, Coverage, sphere_cell
 from magcomp.live.guide import (
-    Situation,
     View,
     guide,
     level_seconds,
     levels_done,
     pilot_is_done,
+    wanted_heading,
 )
+from magcomp.live.situation import Situation
 from magcomp.model import Grade
 
 CELLS = BANDS * SECTORS
@@ -52,6 +53,41 @@ def view(situation, **changes):
 
 
 # ---------------------------------------------------------------- what is said
+
+
+@pytest.mark.parametrize("situation", list(Situation))
+def test_what_was_enough_stays_enough_whatever_comes_after(situation):
+    said = guide(view(situation, was_enough=True))
+    assert said.enough
+    assert said.share_done == 1.0
+
+
+def test_a_disarmed_stand_is_never_told_to_raise_the_throttle():
+    held = coverage(l0=[0], l1=[0], l2=[0], l3=[0], l4=[0])
+    for grade in (None, Grade.MARGINAL, Grade.REJECTED):
+        told = guide(
+            view(Situation.STILL, armed=False, coverage=held, seconds=60.0, grade=grade)
+        ).text
+        assert "raise" not in told
+        assert "lower" not in told
+
+
+def test_steps_that_are_all_held_are_enough_once_the_answer_is_steady():
+    held = coverage(l0=[0], l1=[0], l2=[0], l3=[0], l4=[0])
+    still = view(Situation.STILL, coverage=held, seconds=60.0, grade=Grade.MARGINAL)
+    assert guide(still).missing == ("a steady answer",)
+    assert guide(replace(still, stable_refits=2)).enough
+
+
+@given(yaw=st.floats(-3.1, 3.1), seen=st.sets(st.integers(0, SECTORS - 1), min_size=1, max_size=11))
+def test_the_heading_wanted_lies_on_the_side_that_is_told(yaw, seen):
+    flying = view(
+        Situation.FLYING, attitude=(0.0, 0.0, yaw), coverage=throttles_flown(seen), seconds=90.0
+    )
+    turn = math.remainder(wanted_heading(flying) - yaw, math.tau)
+    if len(seen) == SECTORS - 1 or abs(turn) > 3.1:
+        return  # one sector does not matter, and both ways round are the same
+    assert ("to the left" in guide(flying).text) == (turn < 0.0)
 
 
 def throttles_flown(sectors):

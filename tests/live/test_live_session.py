@@ -18,8 +18,8 @@ from magcomp.errors import (
     VehicleRefusedError,
     WriteError,
 )
-from magcomp.live.guide import Situation
 from magcomp.live.session import LiveSession
+from magcomp.live.situation import Situation
 from magcomp.model import Grade, ParameterSet
 from magcomp.simulate import Faults
 from magcomp.sources.tlog import read_tlog

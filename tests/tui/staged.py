@@ -11,7 +11,7 @@ import made
 import scripted
 from scripted import ScriptedSession, until
 
-from magcomp.live.guide import Situation
+from magcomp.live.situation import Situation
 from magcomp.model import Grade
 from magcomp.tui import MagcompApp, writing
 from magcomp.tui.changes import READ_BACK

@@ -12,7 +12,8 @@ import scripted
 from scripted import ScriptedSession, press, screen, until
 
 from magcomp.errors import LinkError, LinkTimeoutError, VehicleRefusedError, WriteError
-from magcomp.live.guide import Guidance, Situation
+from magcomp.live.guide import Guidance
+from magcomp.live.situation import Situation
 from magcomp.model import Grade, ParameterChange, ParameterHistory
 from magcomp.tui import opening, writing
 from magcomp.tui.screens.connect import AddressInput
@@ -106,7 +107,10 @@ async def test_recording_shows_everything_and_says_what_to_do_next(tmp_path):
             "66 %",
             "time 01:23",
             "compass 50 Hz",
-            "lost 1 %",
+            "1 % lost",
+            "missing: headings, a steady answer",
+            "at hover at most 1.3° (95 %), falling █▆▅▄▃ at 24 A",
+            "◇ next, 200°",
             "recording-20250615T150640Z.tlog",
             "ARMED",
             "done",
@@ -116,7 +120,7 @@ async def test_recording_shows_everything_and_says_what_to_do_next(tmp_path):
 
 
 async def test_the_map_fills_as_the_vehicle_turns(tmp_path):
-    session = ScriptedSession()
+    session = ScriptedSession(made.snapshot(situation=Situation.HELD))
     async with scripted.app(tmp_path, session=session).run_test() as pilot:
         await connected(pilot)
         await press(pilot, "n")

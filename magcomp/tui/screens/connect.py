@@ -103,7 +103,7 @@ class ConnectScreen(StepScreen):
     HELP = TargetList.HELP
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("o", "app.open_log", "Open log", id="connect.open"),
-        Binding("s", "app.simulate", "Simulated", id="connect.simulate"),
+        Binding("s", "app.simulate", "Simulate", id="connect.simulate"),
         Binding("a", "address", "Address", id="connect.address"),
         Binding("r", "ports", "Rescan", id="connect.rescan"),
         Binding("x", "app.disconnect", "Disconnect", id="connect.close"),

@@ -14,6 +14,7 @@ from magcomp.tui.widgets.verdict_text import grade_word
 
 _POINTS = ("N", "NE", "E", "SE", "S", "SW", "W", "NW")
 _FULL_MGAUSS = 900.0
+_WITH_BARS = 68
 _SCALES_A = (20.0, 50.0, 100.0, 200.0, 500.0)
 
 
@@ -49,7 +50,7 @@ is.
 
     def picture(self, data: Compasses, width: int, height: int) -> Content:  # noqa: ARG002
         """A line a compass."""
-        length = max(min(width - 64, 30), 6)
+        length = min(width - 62, 60) if width >= _WITH_BARS else 0
         head = f"  compass  strength {'':{length}}   heading   corrected  fit so far"
         lines = [Content.styled(head, "$quiet")]
         lines += [self._row(compass, length, early=data.early) for compass in data.each]
