@@ -45,6 +45,7 @@ _BLOCK_US = 10_000_000
 _FASTEST_HZ = 20.0
 _KEPT_SHARE = 4
 _MOST_BLOCKS = 2048
+_MOST_SENDERS = 32
 _PINNED = frozenset({Message.PARAM_VALUE, Message.AUTOPILOT_VERSION, Message.STATUSTEXT})
 _TYPICAL_DIP = math.radians(60.0)
 
@@ -121,8 +122,8 @@ class Buffer:
         self._kept_last: dict[_Key, _Kept] = {}
         self._lock = threading.Lock()
         self._field = (math.cos(dip_rad), math.sin(dip_rad))
-        self._level = 0
-        self._counts = np.zeros((LEVELS, BANDS * SECTORS), dtype=np.int64)
+        self._levels: dict[tuple[int, int], int] = {}
+        self._counts: dict[tuple[int, int], NDArray[np.int64]] = {}
 
     @property
     def size(self) -> int:
@@ -168,24 +169,45 @@ class Buffer:
         """
         return recording_from_bytes(self.data(), self._source, Choice(system, component), live=True)
 
-    def coverage(self) -> Coverage:
-        """Give the attitudes seen so far; counted as they came, so thinning changes nothing."""
+    def coverage(self, system: int | None = None, component: int | None = None) -> Coverage:
+        """Give the attitudes seen so far; counted as they came, so thinning changes nothing.
+
+        Parameters
+        ----------
+        system, component
+            Whose; None for everybody's.
+        """
         with self._lock:
-            counts = self._counts.copy()
+            counts = np.zeros((LEVELS, BANDS * SECTORS), dtype=np.int64)
+            for sender, seen in self._counts.items():
+                if system in (None, sender[0]) and component in (None, sender[1]):
+                    counts += seen
         counts.setflags(write=False)
         return Coverage(counts)
 
     # ---------------------------------------------------------------- coverage
 
     def _cover(self, message: int, frame: bytes) -> None:
+        sender = source(frame)
         if message == Message.VFR_HUD:
             throttle = int(decode_frame(frame, message)["throttle"]) * 0.01
-            self._level = min(int(throttle * LEVELS), LEVELS - 1)
+            self._levels[sender] = min(int(throttle * LEVELS), LEVELS - 1)
+            while len(self._levels) > _MOST_SENDERS:
+                del self._levels[next(iter(self._levels))]
         elif message == Message.ATTITUDE:
             _, roll, pitch, yaw = decode_frame(frame, message).tolist()[:4]
             if math.isfinite(roll + pitch + yaw):
                 cell = sphere_cell(*self._field_direction(roll, pitch, yaw))
-                self._counts[self._level, cell] += 1
+                self._counts_of(sender)[self._levels.get(sender, 0), cell] += 1
+
+    def _counts_of(self, sender: tuple[int, int]) -> NDArray[np.int64]:
+        counts = self._counts.get(sender)
+        if counts is None:
+            counts = self._counts[sender] = np.zeros((LEVELS, BANDS * SECTORS), dtype=np.int64)
+            while len(self._counts) > _MOST_SENDERS:
+                # The one of whom least was seen: nobody can crowd out a vehicle by many names.
+                del self._counts[min(self._counts, key=lambda each: int(self._counts[each].sum()))]
+        return counts
 
     def _field_direction(self, roll: float, pitch: float, yaw: float) -> tuple[float, float, float]:
         """Unit vector of a northward, dipping field in body axes."""

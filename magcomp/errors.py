@@ -103,3 +103,8 @@ class WriteError(MagcompError):
     """A parameter was not taken, or reads back as something else."""
 
     exit_code = ExitCode.WRITE
+
+
+def unforeseen(error: BaseException) -> str:
+    """Name an error that no code meant to happen, as a clause."""
+    return f"this should not have happened: {type(error).__name__}: {error}"

@@ -13,8 +13,8 @@ from magcomp.sources import read
 
 @cache
 def recording(name: str) -> Recording:
-    """A recording of sitl_fixtures/."""
-    return read(truth.FIXTURES / f"{name}.tlog")
+    """A recording of sitl_fixtures/; a .tlog where the name does not say otherwise."""
+    return read(truth.FIXTURES / (name if "." in name else f"{name}.tlog"))
 
 
 @cache
@@ -31,7 +31,7 @@ def result(name: str, compass: int) -> CompassResult:
 @cache
 def of_fixture(name: str) -> truth.Truth:
     """The vehicle as it really was."""
-    return truth.of_fixture(name, recording(name).start_unix_s)
+    return truth.of_fixture(name.partition(".")[0], recording(name).start_unix_s)
 
 
 REAL_LOGS = sorted(truth.REAL.glob("*")) if truth.REAL.is_dir() else []

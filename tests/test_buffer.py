@@ -281,6 +281,25 @@ class TestCoverage:
     def test_attitudes_that_are_no_numbers_count_nowhere(self):
         assert self.turned(0, [(math.nan, 0, 0), (0, math.inf, 0)]).counts.sum() == 0
 
+    def test_only_the_chosen_vehicle_counts(self):
+        buffer = Buffer("x")
+        ours, other = FakeVehicle(system=1), FakeVehicle(system=2)
+        for index in range(40):
+            buffer.add(UNIX_US + index * 100_000, ours.attitude(index * 0.1, yaw=0.0))
+            buffer.add(UNIX_US + index * 100_000, other.attitude(index * 0.1, yaw=index * 0.1))
+        assert buffer.coverage(1, 1).counts.sum() == buffer.coverage(1, 1).counts.max() == 40
+        assert (buffer.coverage(2).counts > 0).sum() > 5
+        assert buffer.coverage().counts.sum() == 80
+
+    def test_many_senders_cost_no_memory_and_crowd_nobody_out(self):
+        buffer = Buffer("x")
+        for index in range(50):
+            buffer.add(UNIX_US + index * 100_000, FakeVehicle().attitude(index * 0.1, yaw=0.0))
+        for system in range(2, 200):
+            buffer.add(UNIX_US, FakeVehicle(system=system).attitude(1.0, yaw=0.0))
+        assert buffer.coverage(1).counts.sum() == 50
+        assert len(buffer._counts) <= 32
+
     def test_a_coverage_does_not_change_with_the_buffer(self):
         buffer = filled(FIXTURES / "sweep_current.tlog")
         coverage = buffer.coverage()

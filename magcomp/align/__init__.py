@@ -3,14 +3,13 @@
 from magcomp.align.control import controls, reported
 from magcomp.align.expected import expected_earth, has_position
 from magcomp.align.readings import readings, within
-from magcomp.align.sample import interpolate, low_pass, sample
+from magcomp.align.sample import interpolate, sample
 
 __all__ = [
     "controls",
     "expected_earth",
     "has_position",
     "interpolate",
-    "low_pass",
     "readings",
     "reported",
     "sample",

@@ -10,10 +10,13 @@ does not bias a slope the way an error of interpolation does.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from magcomp import autopilots
-from magcomp.align.sample import interpolate, low_pass
+from magcomp.align.low_pass import low_pass
+from magcomp.align.sample import interpolate
 from magcomp.autopilots.protocol import MotorOutputs
 from magcomp.model import (
     CURRENT,
@@ -34,8 +37,16 @@ _CUT_SHARE = 0.1
 _SMOOTHINGS = (0.03, 0.06, 0.1, 0.15, 0.2, 0.3)
 """Time constants in seconds by which a battery monitor may smooth."""
 _STEPS_SEEN = 1.5
+_CLEARLY_SMOOTHED = 0.9
 _MOST_ROWS = 1_000_000
 """More rows in even steps than this mean that the times are not to be trusted."""
+
+
+class _Rebuilt(NamedTuple):
+    """A form of a quantity, and the mean square it leaves of what was reported."""
+
+    control: Control
+    cost: float
 
 
 def controls(recording: Recording) -> tuple[Control, ...]:
@@ -54,9 +65,11 @@ def controls(recording: Recording) -> tuple[Control, ...]:
         of_escs = recording.battery == SPEED_CONTROLLERS
         name = "the speed controllers' current" if of_escs else "battery current"
         found.append(Control(CURRENT, recording.current, name))
-        for features, source in _finer(recording, duty):
-            whole = f"{name}, rebuilt from the {source}"
-            found.extend(_rebuilt(recording.current, features, CURRENT, whole))
+        rebuilt = [
+            _rebuilt(recording.current, features, CURRENT, f"{name}, rebuilt from the {source}")
+            for features, source in _finer(recording, duty)
+        ]
+        found.extend(_best(rebuilt))
     if recording.throttle is not None and _varies(recording.throttle):
         throttle = Series(recording.throttle.time, _mend_percent(recording.throttle.value))
         found.append(Control(THROTTLE, throttle, "reported throttle"))
@@ -69,7 +82,7 @@ def controls(recording: Recording) -> tuple[Control, ...]:
                 )
             else:
                 name = "reported throttle, rebuilt from the motor outputs"
-                found.extend(_rebuilt(throttle, duty, THROTTLE, name))
+                found.extend(_best([_rebuilt(throttle, duty, THROTTLE, name)]))
     return tuple(found)
 
 
@@ -145,34 +158,41 @@ def _finer(recording: Recording, duty: Series | None) -> list[tuple[Series, str]
     return found
 
 
-def _rebuilt(reference: Series, duty: Series, kind: str, name: str) -> list[Control]:
+def _best(forms: list[_Rebuilt | None]) -> list[Control]:
+    """The form that explains what was reported best; none where none does."""
+    whole = [form for form in forms if form is not None]
+    return [min(whole, key=lambda form: form.cost).control] if whole else []
+
+
+def _rebuilt(reference: Series, duty: Series, kind: str, name: str) -> _Rebuilt | None:
     """The reference regressed on powers of the duty, shape (n, k), sampled more often.
 
-    A battery monitor smooths what it measures. Where the duty is told often enough to see that,
-    the quantity before it was smoothed is a form of its own: a shift in time is not all that lies
-    between the two, and a slope against the smoothed one comes out too large.
+    A battery monitor smooths what it measures. Where the duty is told often enough to show that,
+    the quantity is rebuilt as it was before: more than a shift in time lies between the two, and a
+    slope against the smoothed one comes out too large.
     """
     if len(reference) < _LEAST_ROWS:
-        return []
+        return None
     powers = np.stack([np.mean(duty.value**k, axis=1) for k in (1, 2, 3)], axis=1)
-    found = [_rebuilt_through(reference, Series(duty.time, powers), 0.0, kind, name)]
+    features = Series(duty.time, powers)
+    plain = _rebuilt_through(reference, features, 0.0, kind, name)
+    if plain is None:
+        return None
     step = float(np.median(np.diff(duty.time)))
-    smoothings = [each for each in _SMOOTHINGS if each > _STEPS_SEEN * step > 0.0]
-    if smoothings and found[0] is not None:
-        whole = f"{name} as before its smoothing"
-        forms = [
-            _rebuilt_through(reference, Series(duty.time, powers), each, kind, whole)
-            for each in smoothings
-        ]
-        better = [form for form in forms if form is not None and form[1] < found[0][1]]
-        found.append(min(better, key=lambda form: form[1], default=None))
-    return [form[0] for form in found if form is not None]
+    smoothed = [
+        found
+        for each in _SMOOTHINGS
+        if each > _STEPS_SEEN * step > 0.0
+        and (found := _rebuilt_through(reference, features, each, kind, name)) is not None
+    ]
+    best = min(smoothed, key=lambda found: found.cost, default=plain)
+    return best if best.cost < _CLEARLY_SMOOTHED * plain.cost else plain
 
 
 def _rebuilt_through(
     reference: Series, features: Series, smoothing: float, kind: str, name: str
-) -> tuple[Control, float] | None:
-    """The quantity of which the reference is the smoothed one, and the mean square it leaves."""
+) -> _Rebuilt | None:
+    """The quantity of which the reference is the smoothed one."""
     seen = _smoothed(features, smoothing)
     fits = [_regress(reference, seen, shift) for shift in _SHIFTS]
     best = min(range(len(fits)), key=lambda k: fits[k][1])
@@ -185,7 +205,7 @@ def _rebuilt_through(
     trend = _running_mean(Series(reference.time, left), _TREND_S)
     modelled = coefficients[0] + features.value @ coefficients[1:]
     value = np.maximum(modelled + interpolate(trend, time), 0.0)
-    return Control(kind, Series(time, value), name), cost
+    return _Rebuilt(Control(kind, Series(time, value), name), cost)
 
 
 def _smoothed(series: Series, constant: float) -> Series:

@@ -13,9 +13,6 @@ from magcomp.model import Control, FloatArray, Lags, Readings, Samples, Series
 _RATE_STEP_S = 0.05
 
 
-_NEGLIGIBLE = 1e-15
-
-
 def sample(
     readings: Readings, control: Control, in_force: Mapping[str, Control], lags: Lags
 ) -> Samples:
@@ -72,39 +69,6 @@ def interpolate(series: Series, time: FloatArray) -> FloatArray:
     if series.value.ndim == 1:
         return np.asarray(np.interp(time, series.time, series.value))
     return np.stack([np.interp(time, series.time, column) for column in series.value.T], axis=1)
-
-
-def low_pass(value: FloatArray, share: float, start: FloatArray | float) -> FloatArray:
-    """What a first-order low pass makes of evenly sampled columns, shape (n, k).
-
-    Parameters
-    ----------
-    value
-        Columns, shape (n, k).
-    share
-        Weight of each new value, 0 … 1.
-    start
-        What came out before the first, shape (k,) or a number.
-
-    Notes
-    -----
-    yᵢ = (1 − share) · yᵢ₋₁ + share · xᵢ, summed over 1, 2, 4, … neighbours: importing a library of
-    filters takes longer than all else a fit does.
-
-    Examples
-    --------
-    >>> low_pass(np.ones((3, 1)), 0.5, 0.0).ravel()
-    array([0.5  , 0.75 , 0.875])
-    """
-    kept = 1.0 - share
-    out = share * value
-    if len(out):
-        out[0] += kept * start
-    reach = 1
-    while reach < len(out) and kept > _NEGLIGIBLE:
-        out[reach:] += kept * out[:-reach]
-        kept, reach = kept * kept, 2 * reach
-    return np.asarray(out)
 
 
 def _rate(series: Series, time: FloatArray) -> FloatArray:

@@ -16,7 +16,7 @@ from magcomp.analysis.multiplied import kinds_to_try, multiplied_notes, why_only
 from magcomp.analysis.vehicle_words import in_words_of
 from magcomp.earth import EarthField
 from magcomp.errors import MissingDataError, UsageError
-from magcomp.fit import METHODS, Problem, best_form, fit
+from magcomp.fit import METHODS, Problem, best_form, fit, require_readings
 from magcomp.judge import judge, judge_present
 from magcomp.model import (
     CURRENT,
@@ -222,6 +222,7 @@ def _one(
     earth: EarthField,
 ) -> _Judged:
     new = readings(recording, compass, start=wanted.start, end=wanted.end)
+    require_readings(new)
     problem = best_form([Problem(new, form, in_force, earth) for form in forms])
     complaints = compass_complaints(recording, compass)
     if problem.control.kind == CURRENT:
@@ -337,6 +338,7 @@ def _notes(
         yield "the log holds no position: the earth's field is taken from the readings themselves"
     yield from multiplied_notes(recording, chosen)
     autopilot = autopilots.of(recording)
+    yield from autopilot.reading_notes(recording)
     yield from autopilot.warnings(recording.parameters.latest)
     for compass, why in sorted(autopilot.left_out(recording.parameters).items()):
         if compass in recording.field and wanted.compass is None:

@@ -11,6 +11,7 @@ from magcomp import autopilots
 from magcomp.align import has_position
 from magcomp.align.readings import is_new
 from magcomp.errors import InputError
+from magcomp.fit import LEAST_READINGS
 from magcomp.model import Compass, Recording, Series
 
 SLOW_HZ = 0.8
@@ -210,14 +211,25 @@ def _missing(recording: Recording, found: tuple[CompassContents, ...]) -> Iterat
         yield Missing("a firmware that can be served", str(error), prevents=True)
     how = {
         name: autopilot.how_to_record(name, recording.format)
-        for name in ("compass", "control", "current", "attitude", "parameters", "position")
+        for name in (
+            "compass",
+            "more readings",
+            "control",
+            "current",
+            "attitude",
+            "parameters",
+            "position",
+        )
     }
     if not found:
         yield Missing("readings of a compass", how["compass"], prevents=True)
     elif all(compass.left_out for compass in found):
         yield Missing("a compass that can be fitted", found[0].left_out, prevents=True)
+    elif all(compass.readings < LEAST_READINGS for compass in found):
+        what = f"{LEAST_READINGS} new readings of a compass"
+        yield Missing(what, how["more readings"], prevents=True)
     elif all(compass.rate_hz < SLOW_HZ for compass in found):
-        yield Missing("a reading of a compass each second", how["compass"], prevents=False)
+        yield Missing("a reading of a compass each second", how["more readings"], prevents=False)
     yield from _missing_controls(recording, how)
     if recording.attitude is None or len(recording.attitude) < 2:
         yield Missing("the attitude", how["attitude"], prevents=True)

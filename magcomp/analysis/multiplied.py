@@ -10,6 +10,7 @@ from magcomp import autopilots
 from magcomp.errors import MissingDataError
 from magcomp.model import CURRENT, SPEED_CONTROLLERS, FloatArray, Recording, Series
 
+_USUAL = ("copter", "unknown")
 _LEAST_SHARE = 0.1
 _LEAST_CORRELATION = 0.8
 _LEAST_ROWS = 30
@@ -58,6 +59,11 @@ def why_only_to_look_at(recording: Recording, kind: str) -> str:
 
 def multiplied_notes(recording: Recording, kind: str) -> Iterator[str]:
     """What a user should know of the control quantity that was fitted."""
+    vehicle = recording.vehicle
+    if vehicle.kind not in _USUAL:
+        autopilot = autopilots.of(recording)
+        can = " or ".join(autopilot.multiplied(vehicle))
+        yield f"the vehicle is a {vehicle.kind}, in which {autopilot.title} multiplies the {can}"
     if kind == CURRENT:
         yield from _other_batteries(recording)
     if why_not := why_only_to_look_at(recording, kind):

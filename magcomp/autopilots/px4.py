@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping
+from bisect import bisect_right
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -41,6 +42,7 @@ from magcomp.autopilots.px4_names import (
 )
 from magcomp.autopilots.px4_rotation import sensor_to_body
 from magcomp.autopilots.px4_settings import NUMBERS
+from magcomp.autopilots.px4_telemetry import by_slot
 from magcomp.errors import InputError, MissingDataError
 from magcomp.model import (
     CURRENT,
@@ -127,6 +129,13 @@ class Px4:
         """On the link whole mGauss, in the log floats."""
         return FieldMeaning(truncated=source_format != "ulog", applied_later_s=0.0)
 
+    def from_telemetry(
+        self, told: Mapping[int, Series], values: Mapping[str, float]
+    ) -> tuple[Mapping[int, Series], frozenset[int]]:
+        """The sensors' own fields, turned into body axes; none while no slot is known."""
+        found = by_slot(told, values)
+        return found, frozenset(found)
+
     def lag_priors(self, source_format: str) -> LagPriors:
         """The log stamps a reading with the mean time of what it is made of."""
         return _LOGGED if source_format == "ulog" else _LINK
@@ -171,19 +180,25 @@ class Px4:
         """As after a start with these values."""
         return in_force(after_start(values, compass), sensor_to_body(values, compass))
 
-    def in_force_at(
+    def in_force_at(self, parameters: ParameterHistory, compass: int, time: float) -> InForce:
+        """What of the parameters had been taken over by a vehicle that was never armed."""
+        return self.in_force_over(parameters, compass, (time,), armed=None)[0]
+
+    def in_force_over(
         self,
         parameters: ParameterHistory,
         compass: int,
-        time: float,
+        times: Sequence[float],
         *,
-        armed: Series | None = None,
-    ) -> InForce:
+        armed: Series | None,
+    ) -> tuple[InForce, ...]:
         """What of the parameters had been taken over."""
         found = stretches(parameters, compass, armed)
-        now = next(calibration for since, calibration in reversed(found) if since <= time)
         rotation = sensor_to_body(parameters.latest, compass)
-        return in_force(now, rotation, unseen(parameters, compass))
+        missing = unseen(parameters, compass)
+        forces = [in_force(calibration, rotation, missing) for _, calibration in found]
+        since = [time for time, _ in found]
+        return tuple(forces[bisect_right(since, time) - 1] for time in times)
 
     def regressor(self, values: Mapping[str, float]) -> str | None:
         """CAL_MAG_COMP_TYP serves all compasses; values that the firmware does not know are off."""
@@ -271,6 +286,20 @@ class Px4:
         """A bit of SDLOG_PROFILE; telemetry as it is sends too little of everything."""
         asked = _LOG_BITS if source_format == "ulog" else _LINK_MESSAGES
         return asked[quantity]
+
+    def reading_notes(self, recording: Recording) -> tuple[str, ...]:
+        """Of telemetry that does not say which compass is which."""
+        if recording.format == "ulog" or len(recording.field) < 2:
+            return ()
+        named = ", ".join(single_name("ID", number) for number in sorted(recording.field))
+        return (
+            "telemetry does not say which compass is which: its messages are taken for "
+            f"{named} by how well each calibration fits; {_OWN_LOG} to be sure",
+        )
+
+    def deaf_hint(self) -> str:
+        """It takes every ground station; a link may carry one way only."""
+        return "does the link carry anything to the vehicle, or only from it?"
 
     def no_compass_hint(self) -> str:
         """Telemetry sends no compass by itself."""

@@ -79,4 +79,7 @@ def _degrees(values: Mapping[str, float], names: tuple[str, ...]) -> tuple[float
 
 def _turn(roll: float, pitch: float, yaw: float) -> FloatArray:
     """About z by yaw, then y by pitch, then x by roll, degrees; shape (3, 3)."""
-    return np.asarray(body_from_earth(*np.radians([roll, pitch, yaw])).T)
+    turned = body_from_earth(*np.radians([roll, pitch, yaw])).T
+    whole = np.rint(turned)
+    # Turns by right angles only change places and signs, to the last bit.
+    return np.asarray(np.where(np.abs(turned - whole) < 1e-9, whole, turned))

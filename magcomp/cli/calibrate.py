@@ -32,6 +32,7 @@ from magcomp.errors import ExitCode, InputError, UsageError
 from magcomp.link import Replay, parse_address
 from magcomp.live.guide import pilot_is_done
 from magcomp.live.session import LiveSession
+from magcomp.live.situation import Manoeuvre
 from magcomp.live.snapshot import LiveSnapshot
 from magcomp.live.upload import DISARM_S, new_file
 from magcomp.model import Analysis, Grade, ParameterSet, Recording
@@ -118,6 +119,11 @@ def wish_options(command: Callable[..., _Result]) -> Callable[..., _Result]:
     metavar="FILE.tlog",
     help="Where all that arrives is kept; by default in magcomp's data directory.",
 )
+@click.option(
+    "--manoeuvre",
+    type=click.Choice([each.value for each in Manoeuvre]),
+    help="What is done: held on a stand, flown, or tied down; by default it is found out.",
+)
 @method_option
 @regressor_option
 @wish_options
@@ -126,6 +132,7 @@ def calibrate(
     address: str,
     seconds: float | None,
     record_to: Path | None,
+    manoeuvre: str | None,
     method: str,
     regressor: str,
     wishes: Wishes,
@@ -155,8 +162,10 @@ def calibrate(
         component=link.component,
         baud=link.baud,
         signing_key=link.key,
+        source_system=link.source_system,
         options=options,
     ) as session:
+        session.manoeuvre = None if manoeuvre is None else Manoeuvre(manoeuvre)
         _collect(session, link.timeout, limit)
         recording, analysis = _fit(session, options, record_to)
         chosen = parameter_set(analysis)

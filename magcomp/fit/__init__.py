@@ -1,6 +1,6 @@
 """Samples → MotorFit: three ways the same number is found."""
 
-from magcomp.fit.auto import METHODS, best_form, fit, refit
+from magcomp.fit.auto import LEAST_READINGS, METHODS, best_form, fit, refit, require_readings
 from magcomp.fit.ellipsoid import Ellipsoids, fit_ellipsoid, fit_ellipsoids
 from magcomp.fit.flight import Problem
 from magcomp.fit.folds import folds
@@ -10,6 +10,7 @@ from magcomp.fit.residual import departures, residuals, spread
 from magcomp.fit.sweep import is_still
 
 __all__ = [
+    "LEAST_READINGS",
     "METHODS",
     "Ellipsoids",
     "Problem",
@@ -25,6 +26,7 @@ __all__ = [
     "orthogonal_line",
     "paper_line",
     "refit",
+    "require_readings",
     "residuals",
     "spread",
     "weighted_line",

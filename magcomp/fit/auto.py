@@ -29,7 +29,16 @@ from magcomp.fit.levels import centres_of_flight, fit_levels, usable_levels, wit
 from magcomp.fit.residual import residuals, spread
 from magcomp.fit.robust import Estimate
 from magcomp.fit.sweep import fit_sweep, is_still
-from magcomp.model import CORRECTION_SIZE, OFFSET, BoolArray, FloatArray, Lags, MotorFit, pack
+from magcomp.model import (
+    CORRECTION_SIZE,
+    OFFSET,
+    BoolArray,
+    FloatArray,
+    Lags,
+    MotorFit,
+    Readings,
+    pack,
+)
 
 METHODS = ("auto", "sweep", "levels", "flight")
 
@@ -49,7 +58,7 @@ SHARP_OFFSET = 0.05
 LEAST_SOFT_IRON, MOST_SOFT_IRON = 0.6, 1.6
 """Soft iron of a compass that can be used at all has its eigenvalues between these."""
 
-_LEAST_READINGS = 60
+LEAST_READINGS = 60
 _MOST_FREE = len(GROUPS)
 _QUICK = 2
 
@@ -77,11 +86,7 @@ def fit(problem: Problem, method: str = "auto") -> MotorFit:
         raise UsageError(
             f"The method must be one of {', '.join(METHODS)}; instead received {method}"
         )
-    if len(problem.readings) < _LEAST_READINGS:
-        raise MissingDataError(
-            f"Compass {problem.readings.compass} must have at least {_LEAST_READINGS} new "
-            f"readings; instead it has {len(problem.readings)}"
-        )
+    require_readings(problem.readings)
     samples = problem.sample(Lags())
     still = is_still(samples)
     if method == "sweep" and not still:
@@ -102,6 +107,21 @@ def fit(problem: Problem, method: str = "auto") -> MotorFit:
                 f"{problem.control.kind}; instead the log holds {count}"
             )
     return fit_flight(problem)
+
+
+def require_readings(readings: Readings) -> None:
+    """Refuse a compass with too few readings.
+
+    Raises
+    ------
+    MissingDataError
+        With fewer than ``LEAST_READINGS``.
+    """
+    if len(readings) < LEAST_READINGS:
+        raise MissingDataError(
+            f"Compass {readings.compass} must have at least {LEAST_READINGS} new readings; "
+            f"instead it has {len(readings)}"
+        )
 
 
 def refit(problem: Problem, fit: MotorFit, keep: BoolArray) -> MotorFit:

@@ -20,7 +20,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from magcomp.align import low_pass, sample, within
+from magcomp.align import sample, within
+from magcomp.align.low_pass import low_pass
 from magcomp.earth import EarthField
 from magcomp.fit.control_noise import Noise, noise_of, whitened
 from magcomp.fit.robust import ROUNDS, Estimate, Prior, solve, time_blocks
@@ -387,7 +388,7 @@ def _leaning(samples: Samples) -> FloatArray:
     step = max(float(np.median(np.diff(samples.time))), 1e-3)
     share = step / (LEAN_S + step)
     tilt = samples.attitude[:, :2] - np.median(samples.attitude[:, :2], axis=0)
-    return low_pass(tilt, share, 0.0)
+    return low_pass(tilt, share)
 
 
 def vertical_of(parameters: FloatArray) -> float:

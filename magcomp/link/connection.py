@@ -19,7 +19,7 @@ from magcomp.link.address import (
 from magcomp.link.clock import Clock, SystemClock
 from magcomp.link.diagnosis import why_no_vehicle
 from magcomp.link.events import LinkEvent
-from magcomp.link.framing import Message
+from magcomp.link.framing import GROUND_STATION_SYSTEM, Message
 from magcomp.link.opening import open_transport
 from magcomp.link.quality import LinkStatistics
 from magcomp.link.sinks import FrameSink, Sinks
@@ -55,6 +55,8 @@ class Connection:
         autopilots have.
     key
         Signing key of 32 bytes; None where the link is not signed.
+    source_system
+        The number this ground station gives itself.
     sinks
         Take every frame that arrives, whoever sent it.
 
@@ -72,6 +74,7 @@ class Connection:
         system: int | None = None,
         component: int | None = None,
         key: bytes | None = None,
+        source_system: int = GROUND_STATION_SYSTEM,
         sinks: Sequence[FrameSink] = (),
     ) -> None:
         self.address = address
@@ -81,11 +84,16 @@ class Connection:
         self._transport = opener()
         clock = self._transport.clock
         self._state = LinkState(
-            system=system, component=component, key=key, unix_us=clock.unix_us()
+            system=system,
+            component=component,
+            key=key,
+            unix_us=clock.unix_us(),
+            source_system=source_system,
         )
         self._inbox: deque[Message] = deque(maxlen=_INBOX)
         self._events: deque[LinkEvent] = deque(maxlen=_EVENTS)
         self._changed = threading.Condition()
+        self._writing = threading.Lock()
         self._stop = threading.Event()
         self._ended = False
         self._failure: BaseException | None = None
@@ -132,6 +140,12 @@ class Connection:
         with self._changed:
             self._changed.wait_for(self._vehicle_clear, timeout)
             self._raise_failure()
+            if self._state.has_twin and self._state.ambiguous():
+                raise LinkError(
+                    f"One vehicle of a number must be on {self.address}; instead two at different "
+                    f"addresses say that they are system {self._state.heartbeats[0].system}. "
+                    "Give one of them another number, or switch it off."
+                )
             if self._state.ambiguous():
                 systems = " and ".join(
                     f"{h.system} ({h.autopilot} {h.kind})" for h in self._state.heartbeats
@@ -155,11 +169,10 @@ class Connection:
         LinkError
             The connection was closed.
         """
-        with self._changed:
-            if self._stop.is_set():
-                raise LinkError(f"The connection to {self.address} is closed.")
-            self._raise_failure()
-            self._write(message)
+        if self._stop.is_set():
+            raise LinkError(f"The connection to {self.address} is closed.")
+        self._raise_failure()
+        self._write(message)
 
     def receive(self, timeout: float) -> Message | None:
         """Give the vehicle's next message, or None when none came within ``timeout`` seconds.
@@ -224,10 +237,17 @@ class Connection:
             self._raise_failure()
             return self._state.stream_report or report
 
+    @property
+    def requested_rates(self) -> Mapping[str, float]:
+        """Message name to Hz, as asked for last; empty before that."""
+        with self._changed:
+            report = self._state.stream_report
+        return {} if report is None else report.requested
+
     # ---------------------------------------------------------------- how it goes
 
     def statistics(self) -> LinkStatistics:
-        """Losses, rates, round trip and gaps up to now."""
+        """Losses, rates, round trip and gaps up to now; never waits for a slow link or disk."""
         with self._changed:
             return self._state.statistics(self._now(), reopened=self._reopened, unsent=self._unsent)
 
@@ -275,23 +295,35 @@ class Connection:
             self._reopen("silence")
 
     def _pump(self, data: bytes) -> None:
+        # Disk and line may be slow, so neither is waited for while others need the state.
         with self._changed:
             now, unix_us = self._now(), self._transport.clock.unix_us()
-            for received in self._state.receive(data, now):
-                self._events.extend(self._sinks.add(unix_us, received.frame.raw, now))
-                if received.from_vehicle:
-                    self._inbox.append(received.frame.message)
-            for message in self._state.due(now):
-                self._write(message)
+            taken = self._state.receive(data, now, self._transport.peer)
+            due = self._state.due(now)
+            self._transport.keep_to(self._state.peer)
+        failed = [
+            event
+            for received in taken
+            if not received.from_stranger
+            for event in self._sinks.add(unix_us, received.frame.raw, now)
+        ]
+        with self._changed:
+            self._inbox.extend(each.frame.message for each in taken if each.from_vehicle)
+            self._events.extend(failed)
             self._events.extend(self._state.take_events())
             self._changed.notify_all()
+        for message in due:
+            self._write(message)
 
     def _write(self, message: Message) -> None:
-        raw = self._state.pack(message, self._transport.clock.unix_us())
-        try:
-            self._transport.write(raw)
-        except TransportClosedError:
-            self._unsent += 1  # the reading thread notices and opens it again
+        with self._writing:  # frames are numbered and signed in the order in which they are sent
+            with self._changed:
+                transport = self._transport
+                raw = self._state.pack(message, transport.clock.unix_us())
+            try:
+                transport.write(raw)
+            except TransportClosedError:
+                self._unsent += 1  # the reading thread notices and opens it again
 
     def _stalled(self) -> bool:
         """Tell whether a connected transport may be dead without knowing it."""
@@ -365,6 +397,7 @@ def connect(
     system: int | None = None,
     component: int | None = None,
     key: bytes | None = None,
+    source_system: int = GROUND_STATION_SYSTEM,
     sinks: Sequence[FrameSink] = (),
     clock: Clock | None = None,
 ) -> Connection:
@@ -381,6 +414,8 @@ def connect(
         autopilots have.
     key
         Signing key of 32 bytes, from ``read_signing_key``.
+    source_system
+        The number this ground station gives itself.
     sinks
         Recorders and buffers; the caller closes them.
     clock
@@ -403,5 +438,6 @@ def connect(
         system=system,
         component=component,
         key=key,
+        source_system=source_system,
         sinks=sinks,
     )

@@ -49,4 +49,12 @@ class SinkFailed:
     error: Exception
 
 
-LinkEvent = VehicleFound | VehicleRebooted | GapStarted | GapEnded | SinkFailed
+@dataclass(frozen=True)
+class StrangerHeard:
+    """Somebody at another address speaks in the vehicle's name; it is not listened to."""
+
+    time: float
+    where: str
+
+
+LinkEvent = VehicleFound | VehicleRebooted | GapStarted | GapEnded | SinkFailed | StrangerHeard

@@ -13,12 +13,13 @@ Rules
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from magcomp.link.signing import SignatureCheck, signing_timestamp
+from magcomp.link.transport import Peer
 from magcomp.mavlink.header import (
     frame_length,
     is_marker,
@@ -36,6 +37,7 @@ GROUND_STATION_SYSTEM = 255
 GROUND_STATION_COMPONENT = 190  # MAV_COMP_ID_MISSIONPLANNER, as ground stations announce themselves
 
 _PATIENCE_S = 1.0
+_MOST_PEERS = 32
 
 
 @dataclass(frozen=True)
@@ -79,6 +81,14 @@ class FrameCounts:
     skipped: int = 0
 
 
+@dataclass
+class _Half:
+    """Bytes of a frame that is not complete, and since when."""
+
+    pending: bytearray = field(default_factory=bytearray)
+    since: float = 0.0
+
+
 class Framer:
     """Both directions of one link.
 
@@ -88,40 +98,54 @@ class Framer:
         Signing key of 32 bytes; None leaves signatures unread and signs nothing.
     unix_us
         Calendar time, where the signature's time starts.
+    system
+        The ground station's own number.
     """
 
-    def __init__(self, key: bytes | None = None, unix_us: int = 0) -> None:
+    def __init__(
+        self, key: bytes | None = None, unix_us: int = 0, system: int = GROUND_STATION_SYSTEM
+    ) -> None:
         self.counts = FrameCounts()
         self._check = None if key is None else SignatureCheck(key, unix_us)
-        self._codec = mavlink.MAVLink(None, GROUND_STATION_SYSTEM, GROUND_STATION_COMPONENT)
-        self._pending = bytearray()
-        self._pending_since = 0.0
+        self._codec = mavlink.MAVLink(None, system, GROUND_STATION_COMPONENT)
+        self._halves: dict[Peer, _Half] = {}
+        self._half = _Half()
         if key is not None:
             # Only for sending: the codec without a key decodes what the check has yet to judge.
-            self._signer = mavlink.MAVLink(None, GROUND_STATION_SYSTEM, GROUND_STATION_COMPONENT)
+            self._signer = mavlink.MAVLink(None, system, GROUND_STATION_COMPONENT)
             self._signer.signing.secret_key = key
             self._signer.signing.sign_outgoing = True
         else:
             self._signer = self._codec
 
     def reset(self) -> None:
-        """Forget half a frame, because the bytes that come next are from another connection."""
-        self.counts.skipped += len(self._pending)
-        self._pending.clear()
+        """Forget halves of frames, because the bytes that come next are from another connection."""
+        self.counts.skipped += sum(len(half.pending) for half in self._halves.values())
+        self._halves.clear()
 
-    def receive(self, data: bytes, now: float) -> list[Frame]:
-        """Find the frames that ``data`` completes."""
+    def receive(self, data: bytes, now: float, peer: Peer = None) -> list[Frame]:
+        """Find the frames that ``data`` of a peer completes."""
         self.counts.received += len(data)
-        overdue = bool(self._pending) and now - self._pending_since > _PATIENCE_S
-        before = len(self._pending)
-        self._pending += data
+        half = self._half = self._half_of(peer)
+        overdue = bool(half.pending) and now - half.since > _PATIENCE_S
+        before = len(half.pending)
+        half.pending += data
         frames, position = self._scan(1 if overdue else 0)
         if overdue:
             self.counts.skipped += 1
-        del self._pending[:position]
+        del half.pending[:position]
         if position > 0 or before == 0:
-            self._pending_since = now
+            half.since = now
         return frames
+
+    def _half_of(self, peer: Peer) -> _Half:
+        """A peer's unfinished frame: what two send at once must not run together."""
+        half = self._halves.pop(peer, None) or _Half()
+        self._halves[peer] = half
+        while len(self._halves) > _MOST_PEERS:
+            dropped = self._halves.pop(next(iter(self._halves)))
+            self.counts.skipped += len(dropped.pending)
+        return half
 
     def pack(self, message: Message, unix_us: int) -> bytes:
         """Put a message into a frame of the ground station, signed where there is a key."""
@@ -136,7 +160,7 @@ class Framer:
 
     def _scan(self, position: int) -> tuple[list[Frame], int]:
         """Frames found from ``position`` on, and where the first unfinished one starts."""
-        pending = self._pending
+        pending = self._half.pending
         frames: list[Frame] = []
         while True:
             start = next_marker(pending, position)
@@ -154,7 +178,7 @@ class Framer:
                 frames.append(frame)
 
     def _decode(self, start: int, length: int) -> Frame | None:
-        raw = self._pending[start : start + length]
+        raw = self._half.pending[start : start + length]
         try:
             message = self._codec.decode(raw)
         except mavlink.MAVError:
@@ -165,7 +189,7 @@ class Framer:
 
     def _plausible(self, start: int, length: int) -> bool:
         """Tell whether what cannot be checked stands where a frame should."""
-        pending, end = self._pending, start + length
+        pending, end = self._half.pending, start + length
         if is_version_1(pending[start:end]) or (end < len(pending) and not is_marker(pending[end])):
             return False
         inner = next_marker(pending, start + 1)
@@ -176,11 +200,11 @@ class Framer:
         return True
 
     def _is_sound(self, start: int) -> bool:
-        length = frame_length(self._pending, start)
-        if not length or start + length > len(self._pending):
+        length = frame_length(self._half.pending, start)
+        if not length or start + length > len(self._half.pending):
             return False
         try:
-            message = self._codec.decode(self._pending[start : start + length])
+            message = self._codec.decode(self._half.pending[start : start + length])
         except mavlink.MAVError:
             return False
         return not isinstance(message, mavlink.MAVLink_unknown)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import errno
 import os
+from io import FileIO
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -19,7 +20,8 @@ class Recorder:
     """A .tlog being written. Each frame reaches the operating system before ``add`` returns.
 
     So a killed program loses nothing; a computer that loses power, what its
-    system had not yet put on the disk.
+    system had not yet put on the disk. Until the first frame comes, the file has another
+    name: a vehicle that never answers leaves no empty file, and an older one as it is.
 
     Parameters
     ----------
@@ -37,14 +39,18 @@ class Recorder:
     def __init__(self, path: Path, *, force: bool = False) -> None:
         self.path = path
         self.frames = 0
+        self._force = force
+        self._waiting: Path | None = None
+        self._file: FileIO
         try:
-            self._file = path.open("wb" if force else "xb", buffering=0)
-        except FileExistsError as error:
-            raise OutputError(
-                f"{path} already exists; choose another name or replace it with --force."
-            ) from error
+            if path.exists() and not path.is_file():
+                self._file = FileIO(path, "w")  # a pipe or a device keeps its name
+                return
+            self._refuse_existing()
+            self._waiting = path.with_name(f".{path.name}.{os.getpid()}.part")
+            self._file = FileIO(self._waiting, "w")
         except OSError as error:
-            raise OutputError(f"{path} cannot be written: {error.strerror}.") from error
+            raise self._unwritable(error) from error
 
     def __enter__(self) -> Self:
         return self
@@ -68,9 +74,11 @@ class Recorder:
         left = record(unix_us, frame)
         try:
             while left:
-                left = left[self._file.write(left) :]
+                left = left[self._file.write(left) or 0 :]
+            if self._waiting is not None:
+                self._name()
         except OSError as error:
-            raise OutputError(f"{self.path} cannot be written: {error.strerror}.") from error
+            raise self._unwritable(error) from error
         self.frames += 1
 
     def close(self) -> None:
@@ -89,4 +97,27 @@ class Recorder:
         except OSError as error:
             if error.errno in (errno.EINVAL, errno.ENOTSUP):
                 return  # a pipe or a device: there is no disk to wait for
-            raise OutputError(f"{self.path} cannot be written: {error.strerror}.") from error
+            raise self._unwritable(error) from error
+        finally:
+            if self._waiting is not None:
+                self._waiting.unlink(missing_ok=True)
+
+    def _name(self) -> None:
+        """Give the file its name, now that there is something in it."""
+        waiting, self._waiting = self._waiting, None
+        if waiting is None:
+            return
+        self._refuse_existing()
+        # Not every system renames a file that is open.
+        self._file.close()
+        waiting.replace(self.path)
+        self._file = FileIO(self.path, "a")
+
+    def _refuse_existing(self) -> None:
+        if not self._force and self.path.exists():
+            raise OutputError(
+                f"{self.path} already exists; choose another name or replace it with --force."
+            )
+
+    def _unwritable(self, error: OSError) -> OutputError:
+        return OutputError(f"{self.path} cannot be written: {error.strerror}.")

@@ -8,7 +8,7 @@ import threading
 from magcomp.errors import LogError
 from magcomp.link.address import Replay
 from magcomp.link.clock import Clock
-from magcomp.link.transport import ReplayEndedError
+from magcomp.link.transport import Peer, ReplayEndedError
 from magcomp.mavlink.records import records
 
 _LONGEST_PAUSE_S = 5.0
@@ -34,6 +34,7 @@ class ReplayTransport:
     """
 
     answers = False
+    peer: Peer = None
 
     def __init__(self, address: Replay, clock: Clock) -> None:
         self.clock: Clock = self
@@ -76,6 +77,9 @@ class ReplayTransport:
 
     def write(self, data: bytes) -> None:
         """See Transport.write: a log takes no answer."""
+
+    def keep_to(self, peer: Peer) -> None:
+        """See Transport.keep_to: there is only one."""
 
     def close(self) -> None:
         """See Transport.close."""

@@ -9,7 +9,7 @@ import serial
 from magcomp.errors import LinkError
 from magcomp.link.address import SerialLine, serial_ports
 from magcomp.link.clock import Clock
-from magcomp.link.transport import TransportClosedError
+from magcomp.link.transport import Peer, TransportClosedError
 
 _CHUNK = 65_536
 _WRITE_TIMEOUT_S = 2.0
@@ -25,6 +25,7 @@ class SerialTransport:
     """
 
     answers = True
+    peer: Peer = None
 
     def __init__(self, address: SerialLine, clock: Clock) -> None:
         self.clock = clock
@@ -61,6 +62,9 @@ class SerialTransport:
             return  # a stalled port loses bytes; the reader notices if it stays so
         except (OSError, TypeError) as error:
             raise self._gone() from error
+
+    def keep_to(self, peer: Peer) -> None:
+        """See Transport.keep_to: there is only one."""
 
     def close(self) -> None:
         """See Transport.close."""

@@ -9,8 +9,11 @@ Rules
    they were asked for. Never a PARAM_SET.
 2. The first autopilot heard is the vehicle, unless another was chosen. A second one within
    the settling time makes the link ambiguous, and only who chooses gets on.
-3. A frame is the vehicle's when system *and* component are its own. Only an autopilot's
-   component is a vehicle (see magcomp.mavlink.heartbeat), or the one that was chosen.
+3. A frame is the vehicle's when system *and* component are its own, and it comes from where the
+   vehicle's first heartbeat came from. Only an autopilot's component is a vehicle (see
+   magcomp.mavlink.heartbeat), or the one that was chosen. Who speaks in the vehicle's name from
+   elsewhere is a stranger, and is listened to only when the vehicle has been silent for six
+   seconds: it may have come back on another port. Then it is asked anew who it is.
 4. Three seconds without a frame of the vehicle are a gap, dated from the last one.
 5. A vehicle whose clock runs back by more than two seconds, three messages in a row, rebooted.
 6. A vehicle that talks, but has sent none of its streams for four seconds, has forgotten them, as
@@ -25,11 +28,19 @@ from dataclasses import dataclass
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from magcomp.link.events import GapEnded, GapStarted, LinkEvent, VehicleFound, VehicleRebooted
-from magcomp.link.framing import Frame, Framer, Message
+from magcomp.link.events import (
+    GapEnded,
+    GapStarted,
+    LinkEvent,
+    StrangerHeard,
+    VehicleFound,
+    VehicleRebooted,
+)
+from magcomp.link.framing import GROUND_STATION_SYSTEM, Frame, Framer, Message
 from magcomp.link.identity import Identification, read_heartbeat
 from magcomp.link.quality import Gap, LinkStatistics, RateMeter, SequenceCounter
 from magcomp.link.streams import StreamControl, StreamReport
+from magcomp.link.transport import Peer
 from magcomp.mavlink.heartbeat import Identity, is_vehicle
 from magcomp.model import Vehicle
 
@@ -38,6 +49,9 @@ TIMESYNC_S = 2.0
 SILENCE_S = 3.0
 SETTLING_S = 1.5
 """Other vehicles send heartbeats each second: by then they would have been heard."""
+
+MOVED_S = 6.0
+"""Longer than a writer trusts a vehicle that sends no heartbeat (magcomp.writing.exchange)."""
 
 FORGOTTEN_S = 4.0
 _CLOCK_BACK_MS = 2000
@@ -48,10 +62,11 @@ _FOREIGN_NAMES = 50
 
 @dataclass(frozen=True)
 class Received:
-    """A frame that arrived, and whether it is the vehicle's."""
+    """A frame that arrived, whether it is the vehicle's, and whether it only says so."""
 
     frame: Frame
     from_vehicle: bool
+    from_stranger: bool = False
 
 
 class LinkState:
@@ -66,6 +81,8 @@ class LinkState:
         Signing key, 32 bytes; None where frames are not signed.
     unix_us
         Calendar time of the start, for signatures.
+    source_system
+        The number this ground station gives itself.
     """
 
     def __init__(
@@ -75,14 +92,20 @@ class LinkState:
         component: int | None = None,
         key: bytes | None = None,
         unix_us: int = 0,
+        source_system: int = GROUND_STATION_SYSTEM,
     ) -> None:
-        self._framer = Framer(key, unix_us)
+        self._framer = Framer(key, unix_us, source_system)
+        self._source_system = source_system
         self._wanted_system = system
         self._wanted_component = component
         self._heartbeats: dict[tuple[int, int], Identity] = {}
         self._companions: dict[tuple[int, int], Identity] = {}
         self._foreign: dict[str, int] = {}
         self._vehicle: tuple[int, int] | None = None
+        self.peer: Peer = None
+        self._peer_known = False
+        self._twin = False
+        self._strangers: set[Peer] = set()
         self._found_at = math.inf
         self._known: Vehicle | None = None
         self._identification: Identification | None = None
@@ -137,7 +160,12 @@ class LinkState:
 
     def ambiguous(self) -> bool:
         """Tell whether several vehicles are there and none was chosen."""
-        return self._wanted_system is None and len(self._heartbeats) > 1
+        return self._wanted_system is None and (len(self._heartbeats) > 1 or self._twin)
+
+    @property
+    def has_twin(self) -> bool:
+        """Somebody else spoke in the vehicle's name before it was clear who it is."""
+        return self._twin
 
     def identified(self, now: float) -> bool:
         """Tell whether the vehicle's identity is known, or asking further is hopeless."""
@@ -178,14 +206,15 @@ class LinkState:
 
     # ---------------------------------------------------------------- what goes in
 
-    def receive(self, data: bytes, now: float) -> list[Received]:
-        """Take bytes as they arrived; gives the frames they complete."""
-        return [self._take(frame, now) for frame in self._framer.receive(data, now)]
+    def receive(self, data: bytes, now: float, peer: Peer = None) -> list[Received]:
+        """Take bytes as they arrived from a peer; gives the frames they complete."""
+        return [self._take(frame, now, peer) for frame in self._framer.receive(data, now, peer)]
 
     def reopened(self, now: float) -> None:
         """The transport was opened again: what comes next continues nothing."""
         self._framer.reset()
         self._sequence.restart()
+        self.peer, self._peer_known = None, False
         self._next_heartbeat = now
         self._ask_again()
 
@@ -203,7 +232,7 @@ class LinkState:
             A name magcomp does not stream, or a rate that is not above 0.
         """
         if self._vehicle is not None:
-            self._streams = self._streams or StreamControl(self._vehicle)
+            self._streams = self._streams or StreamControl(self._vehicle, self._source_system)
             self._streams.request(rates, self._meter.rates(now))
 
     def restore_streams(self) -> None:
@@ -252,10 +281,12 @@ class LinkState:
             out.append(mavlink.MAVLink_timesync_message(0, stamp))
         return out
 
-    def _take(self, frame: Frame, now: float) -> Received:
+    def _take(self, frame: Frame, now: float, peer: Peer) -> Received:
         message = frame.message
+        if frame.source == self._vehicle and not self._is_from_there(peer, now):
+            return Received(frame, from_vehicle=False, from_stranger=True)
         if message.get_type() == "HEARTBEAT":
-            self._take_heartbeat(message, now)
+            self._take_heartbeat(message, now, peer)
         if frame.source != self._vehicle:
             if frame.source not in self._heartbeats:
                 self._count_foreign(message.get_type())
@@ -275,7 +306,22 @@ class LinkState:
                 self._streaming_at = now
         return Received(frame, from_vehicle=not self.ambiguous())
 
-    def _take_heartbeat(self, message: Message, now: float) -> None:
+    def _is_from_there(self, peer: Peer, now: float) -> bool:
+        """Whether a frame in the vehicle's name is the vehicle's; warn of each stranger once."""
+        if self._peer_known and peer == self.peer:
+            return True
+        if not self._peer_known or self.silent_for(now) > MOVED_S:
+            self.peer, self._peer_known = peer, True
+            self._sequence.restart()
+            self._ask_again()
+            return True
+        self._twin = self._twin or not self.settled(now)
+        if peer not in self._strangers and len(self._strangers) < _FOREIGN_NAMES:
+            self._strangers.add(peer)
+            self._events.append(StrangerHeard(now, _named(peer)))
+        return False
+
+    def _take_heartbeat(self, message: Message, now: float, peer: Peer) -> None:
         heartbeat = read_heartbeat(message)
         if heartbeat is None:
             return
@@ -289,6 +335,7 @@ class LinkState:
         self._heartbeats[source] = heartbeat
         if self._vehicle is None and self._wanted_system in (None, heartbeat.system):
             self._vehicle = source
+            self.peer, self._peer_known = peer, True
             self._found_at = now
             self._last_heard = now
             self._identification = Identification(heartbeat)
@@ -345,6 +392,10 @@ class LinkState:
             self._gaps[-1] = gap
             self._sequence.restart()
             self._events.append(GapEnded(now, gap.duration))
+
+
+def _named(peer: Peer) -> str:
+    return ":".join(map(str, peer[:2])) if peer else "elsewhere"
 
 
 def _heartbeat() -> Message:

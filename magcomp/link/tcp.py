@@ -7,7 +7,7 @@ import socket
 from magcomp.link.address import TcpClient, TcpServer
 from magcomp.link.clock import Clock
 from magcomp.link.sockets import cannot_open, resolve, wait_readable, wait_writable
-from magcomp.link.transport import TransportClosedError
+from magcomp.link.transport import Peer, TransportClosedError
 
 _CHUNK = 65_536
 _CONNECT_TIMEOUT_S = 3.0
@@ -24,6 +24,7 @@ class TcpTransport:
     """
 
     answers = True
+    peer: Peer = None
 
     def __init__(self, address: TcpClient | TcpServer, clock: Clock) -> None:
         self.clock = clock
@@ -78,6 +79,9 @@ class TcpTransport:
                     raise self._gone() from None
             except OSError as error:
                 raise self._gone() from error
+
+    def keep_to(self, peer: Peer) -> None:
+        """See Transport.keep_to: there is only one."""
 
     def close(self) -> None:
         """See Transport.close."""

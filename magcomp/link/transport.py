@@ -7,6 +7,9 @@ from typing import Protocol
 from magcomp.errors import LinkError
 from magcomp.link.clock import Clock
 
+Peer = tuple[object, ...] | None
+"""Who is at the other end of a socket, as the system tells it."""
+
 
 class TransportClosedError(LinkError):
     """The other end went away; opening the address again may help."""
@@ -27,13 +30,16 @@ class Transport(Protocol):
         Tells when the bytes last read arrived.
     answers
         Whether what is written can reach a vehicle (false for a replay).
+    peer
+        Who sent the bytes last read, where several can; None where only one can.
     """
 
     clock: Clock
     answers: bool
+    peer: Peer
 
     def read(self, timeout: float) -> bytes:
-        """Whatever has arrived, after at most ``timeout`` seconds; empty where nothing has.
+        """What one peer has sent, after at most ``timeout`` seconds; empty where nothing has come.
 
         Raises
         ------
@@ -52,6 +58,10 @@ class Transport(Protocol):
         TransportClosedError
             The other end is gone.
         """
+        ...
+
+    def keep_to(self, peer: Peer) -> None:
+        """Send to this peer only, from now on; None sends to whoever speaks."""
         ...
 
     def close(self) -> None:

@@ -8,18 +8,19 @@ import socket
 from magcomp.link.address import UdpClient, UdpServer
 from magcomp.link.clock import Clock
 from magcomp.link.sockets import cannot_open, resolve, wait_readable
-from magcomp.link.transport import TransportClosedError
+from magcomp.link.transport import Peer, TransportClosedError
 
 _DATAGRAM = 65_535
+_MOST_PEERS = 32
 _PEER_SILENCE_S = 10.0
 _RECEIVE_BUFFER = 1 << 20
 
 
 class UdpTransport:
-    """A UDP socket that answers whoever spoke within the last ten seconds.
+    """A UDP socket that answers whoever spoke within the last ten seconds, until told whom.
 
-    Several peers are normal: two vehicles, or a vehicle that came back on
-    another port after a reboot. The latest is answered even when silent for longer.
+    Several peers are normal: two vehicles, a vehicle that came back on another port after a
+    reboot, or a stranger. The latest is answered even when silent for longer.
 
     Raises
     ------
@@ -28,10 +29,13 @@ class UdpTransport:
     """
 
     answers = True
+    peer: Peer = None
 
     def __init__(self, address: UdpServer | UdpClient, clock: Clock) -> None:
         self.clock = clock
         self._peers: dict[tuple[object, ...], float] = {}
+        self._kept_to: Peer = None
+        self._waiting: tuple[Peer, bytes] | None = None
         self._listening = isinstance(address, UdpServer)
         family, target = resolve(address, socket.SOCK_DGRAM)
         self._socket = socket.socket(family, socket.SOCK_DGRAM)
@@ -53,8 +57,12 @@ class UdpTransport:
 
     def read(self, timeout: float) -> bytes:
         """See Transport.read."""
-        wait_readable(self._socket, timeout)
         data = bytearray()
+        if self._waiting is not None:
+            (self.peer, first), self._waiting = self._waiting, None
+            data += first
+        else:
+            wait_readable(self._socket, timeout)
         while len(data) < _DATAGRAM:
             try:
                 datagram, peer = self._socket.recvfrom(_DATAGRAM)
@@ -64,17 +72,33 @@ class UdpTransport:
                 continue  # an earlier datagram of ours found nobody listening yet
             except OSError as error:
                 raise TransportClosedError(f"The UDP socket failed: {error.strerror}.") from error
-            data += datagram
             if self._listening:
-                self._peers.pop(peer, None)
-                self._peers[peer] = self.clock.monotonic()
+                self._remember(peer)
+                if data and peer != self.peer:
+                    self._waiting = (peer, datagram)
+                    break
+                self.peer = peer
+            data += datagram
         return bytes(data)
+
+    def _remember(self, peer: tuple[object, ...]) -> None:
+        self._peers.pop(peer, None)
+        self._peers[peer] = self.clock.monotonic()
+        while len(self._peers) > _MOST_PEERS:
+            del self._peers[next(iter(self._peers))]
+
+    def keep_to(self, peer: Peer) -> None:
+        """See Transport.keep_to."""
+        self._kept_to = peer
 
     def write(self, data: bytes) -> None:
         """See Transport.write."""
         try:
             if not self._listening:
                 self._send_first(data)
+                return
+            if self._kept_to is not None:
+                self._socket.sendto(data, self._kept_to)
                 return
             recent = self.clock.monotonic() - _PEER_SILENCE_S
             for index, (peer, heard) in enumerate(reversed(list(self._peers.items()))):

@@ -1,47 +1,26 @@
 """What to do next, in words: from what has been seen so far to one sentence. No I/O, no clock.
 
-Situations
-----------
-======== ============================================== =========================================
-GROUND   disarmed, and nothing recorded with motors on  say how to begin
-UNSURE   motors on, still on the ground, not yet known  turn it; no word of throttle
-STILL    motors on, does not turn                       steps of the throttle, *if tied down*
-HELD     motors on, tilted as nobody flies, on the spot turns at steady throttles
-FLYING   has risen or moves over the ground             turn, climb, descend; never a throttle
-======== ============================================== =========================================
+How the recording is being made is told by magcomp.live.situation.
 
 Rules
 -----
 1. A pilot in the air is never told a throttle, a bank or anything else that could cost
    height: only to turn, to climb, to descend when high enough, and to land when it is enough.
-2. Once flying, a vehicle counts as flying until it is disarmed.
-3. Throttle is spoken of only to somebody who holds the vehicle or has tied it down.
+2. Throttle is spoken of only to somebody who holds the vehicle or has tied it down.
+3. Where it is not known whether it flies, only what is right for both is said.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import StrEnum
 
 import numpy as np
 
 from magcomp.buffer import BANDS, LEVELS, SECTORS, Coverage, sphere_cell
+from magcomp.live.situation import Situation, Vector
 from magcomp.model import Grade
-
-Vector = tuple[float, float, float]
-
-RISEN_M = 1.5
-MOVING = 1.5
-"""Metres above where it was armed, and m/s over the ground, that nobody holding it reaches."""
-
-TIPPED_RAD = math.radians(55.0)
-"""A tilt that a multirotor flown for calibration does not have."""
-
-TURNED_RAD = math.radians(30.0)
-"""A vehicle that turns less than this stands still."""
-
-STILL_S = 8.0
 
 LEVEL_ENOUGH = 0.3
 """Share of the sphere at which a level is done: about three turns, one about each axis."""
@@ -62,16 +41,6 @@ LONG_S = 240.0
 """A bound that is worth waiting for, and how long."""
 
 
-class Situation(StrEnum):
-    """How the recording is being made; see the table at the top of the file."""
-
-    GROUND = "ground"
-    UNSURE = "unsure"
-    STILL = "still"
-    HELD = "held"
-    FLYING = "flying"
-
-
 @dataclass(frozen=True)
 class Guidance:
     """What to do next.
@@ -84,11 +53,14 @@ class Guidance:
         0 … 1.
     enough
         Nothing more is needed.
+    missing
+        What is, in a word or two each.
     """
 
     text: str
     share_done: float
     enough: bool = False
+    missing: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +70,7 @@ class View:
     Attributes
     ----------
     situation
-        See :class:`SituationWatch`.
+        See magcomp.live.situation.
     armed
         None while unknown.
     throttle
@@ -117,6 +89,8 @@ class View:
         Analyses in a row that said the same.
     bound_deg
         Heading error that the newest analysis promises not to be exceeded (95 %), degrees.
+    was_enough
+        It was enough before; data do not become fewer.
     """
 
     situation: Situation
@@ -129,75 +103,20 @@ class View:
     grade: Grade | None = None
     stable_refits: int = 0
     bound_deg: float = 0.0
+    was_enough: bool = False
 
 
-class SituationWatch:
-    """Tells a vehicle that flies from one that is held or tied down.
-
-    Fed with what the vehicle says, a few times a second.
-    """
-
-    def __init__(self) -> None:
-        self.situation = Situation.GROUND
-        self._ground_m: float | None = None
-        self._tipped = False
-        self._armed_at: float | None = None
-        self._reference: Vector | None = None
-        self._turned = False
-
-    def update(
-        self,
-        now: float,
-        armed: bool | None,
-        attitude: Vector | None,
-        height_m: float | None,
-        speed: float | None,
-    ) -> Situation:
-        """Take one look; ``now`` in seconds."""
-        if not armed:
-            self._rest(height_m)
-            return self.situation
-        if self._armed_at is None:
-            self._armed_at, self._reference, self._turned = now, attitude, False
-        self._ground_m = height_m if self._ground_m is None else self._ground_m
-        if self.situation is Situation.FLYING or self._is_flying(height_m, speed):
-            self.situation = Situation.FLYING
-            return self.situation
-        self._look(attitude)
-        if self._tipped:
-            self.situation = Situation.HELD
-        elif self._turned or now - self._armed_at < STILL_S:
-            self.situation = Situation.UNSURE
-        else:
-            self.situation = Situation.STILL
-        return self.situation
-
-    def _rest(self, height_m: float | None) -> None:
-        self._ground_m = height_m
-        if self._armed_at is None:
-            return
-        self._armed_at = None
-        if self.situation is Situation.UNSURE:
-            self.situation = Situation.GROUND
-
-    def _is_flying(self, height_m: float | None, speed: float | None) -> bool:
-        risen = None not in (height_m, self._ground_m) and (
-            (height_m or 0.0) - (self._ground_m or 0.0) > RISEN_M
-        )
-        return risen or (speed is not None and speed > MOVING)
-
-    def _look(self, attitude: Vector | None) -> None:
-        if attitude is None:
-            return
-        if self._reference is None:
-            self._reference = attitude
-        turned = (
-            abs(math.remainder(new - old, math.tau))
-            for new, old in zip(attitude, self._reference, strict=True)
-        )
-        self._turned = self._turned or max(turned) > TURNED_RAD
-        tilt = math.acos(math.cos(attitude[0]) * math.cos(attitude[1]))
-        self._tipped = self._tipped or tilt > TIPPED_RAD
+__all__ = [
+    "Guidance",
+    "Situation",
+    "View",
+    "guide",
+    "is_settled",
+    "level_seconds",
+    "levels_done",
+    "pilot_is_done",
+    "wanted_heading",
+]
 
 
 def guide(view: View) -> Guidance:
@@ -207,6 +126,8 @@ def guide(view: View) -> Guidance:
     -----
     See the rules at the top of the file.
     """
+    if view.was_enough:
+        return Guidance(_ending(view), 1.0, enough=True)
     match view.situation:
         case Situation.FLYING:
             return _guide_flight(view)
@@ -215,7 +136,7 @@ def guide(view: View) -> Guidance:
         case Situation.STILL:
             return _guide_still(view)
         case Situation.UNSURE:
-            return Guidance(f"keep the throttle as it is and {_turn(view)}", 0.0)
+            return _guide_unsure(view)
         case _:
             return _guide_ground(view)
 
@@ -236,7 +157,7 @@ def pilot_is_done(situation: Situation, disarmed_s: float, levels: int) -> bool:
     levels
         How many throttle levels are done.
     """
-    if disarmed_s < DISARMED_S or situation in (Situation.GROUND, Situation.UNSURE):
+    if disarmed_s < DISARMED_S or situation is Situation.GROUND:
         return False
     # Whoever holds it may switch the motors off to turn it over, and goes on.
     return situation is not Situation.HELD or levels >= LEVELS_ENOUGH
@@ -262,30 +183,56 @@ def _guide_ground(view: View) -> Guidance:
     )
 
 
+def _guide_unsure(view: View) -> Guidance:
+    """It may hover, or hang on a stand: only what is right for both."""
+    shares = {
+        "headings": min(len(_sectors(view)) / SECTORS_ENOUGH, 1.0),
+        "time": min(view.seconds / FLIGHT_S, 1.0),
+        "a steady answer": _steadiness(view) if view.grade is Grade.GOOD else 0.0,
+    }
+    missing = _missing(shares)
+    if not missing and is_settled(view):
+        return Guidance(_ending(view), 1.0, enough=True)
+    share = 0.9 * float(np.mean(list(shares.values())))
+    return Guidance(f"keep the throttle as it is and {_turn(view)}", share, missing=missing)
+
+
 # -------------------------------------------------------------------------- flying
 
 
 def _guide_flight(view: View) -> Guidance:
     sectors = _sectors(view)
     throttles = sum(seconds >= _THROTTLE_SHARE_S for seconds in level_seconds(view))
-    shares = (
-        min(len(sectors) / SECTORS_ENOUGH, 1.0),
-        min(throttles / THROTTLES_ENOUGH, 1.0),
-        min(view.seconds / FLIGHT_S, 1.0),
-        min(view.stable_refits / _STABLE_REFITS, 1.0) if view.grade is Grade.GOOD else 0.0,
-    )
-    share = float(np.mean(shares))
-    if min(shares) >= 1.0 and is_settled(view):
+    shares = {
+        "headings": min(len(sectors) / SECTORS_ENOUGH, 1.0),
+        "climbs and descents": min(throttles / THROTTLES_ENOUGH, 1.0),
+        "time": min(view.seconds / FLIGHT_S, 1.0),
+        "a steady answer": _steadiness(view) if view.grade is Grade.GOOD else 0.0,
+    }
+    turns, climbs, *_ = shares.values()
+    share = float(np.mean(list(shares.values())))
+    missing = _missing(shares)
+    if not missing and is_settled(view):
         return Guidance(_ending(view), 1.0, enough=True)
     if not view.armed:
-        return Guidance("this flight was not enough: fly once more with turns and climbs", share)
-    if shares[0] < 1.0 and shares[0] <= shares[1]:
-        return Guidance(_turn(view), share)
-    if shares[1] < 1.0:
-        return Guidance(_climb_or_descend(view), share)
-    if shares[0] < 1.0:
-        return Guidance(_turn(view), share)
-    return Guidance(f"keep flying: {_turn_more(view)} and {_climb_or_descend(view)}", share)
+        text = "this flight was not enough: fly once more with turns and climbs"
+    elif turns < 1.0 and turns <= climbs:
+        text = _turn(view)
+    elif climbs < 1.0:
+        text = _climb_or_descend(view)
+    elif turns < 1.0:
+        text = _turn(view)
+    else:
+        text = f"keep flying: {_turn_more(view)} and {_climb_or_descend(view)}"
+    return Guidance(text, share, missing=missing)
+
+
+def _steadiness(view: View) -> float:
+    return min(view.stable_refits / _STABLE_REFITS, 1.0)
+
+
+def _missing(shares: Mapping[str, float]) -> tuple[str, ...]:
+    return tuple(name for name, share in shares.items() if share < 1.0)
 
 
 def _climb_or_descend(view: View) -> str:
@@ -304,20 +251,23 @@ def _guide_held(view: View) -> Guidance:
     fraction = view.coverage.fraction
     done = levels_done(view.coverage)
     best = np.sort(np.minimum(fraction / LEVEL_ENOUGH, 1.0))[::-1][:LEVELS_ENOUGH]
-    share = 0.9 * float(best.sum()) / LEVELS_ENOUGH
-    if len(done) >= LEVELS_ENOUGH:
-        share += 0.1 * min(view.stable_refits / _STABLE_REFITS, 1.0)
-        if is_settled(view):
-            return Guidance(_ending(view), 1.0, enough=True)
+    shares = {
+        "turns at three throttles": float(best.sum()) / LEVELS_ENOUGH,
+        "a steady answer": _steadiness(view) if len(done) >= LEVELS_ENOUGH else 0.0,
+    }
+    turns, steadiness = shares.values()
+    share, missing = 0.9 * turns + 0.1 * steadiness, _missing(shares)
+    if len(done) >= LEVELS_ENOUGH and is_settled(view):
+        return Guidance(_ending(view), 1.0, enough=True)
     level = _level(view)
-    if level in done:
-        wanted = next((each for each in _HELD_LEVELS if each not in done), LEVELS // 2 + 1)
-        if len(done) >= LEVELS_ENOUGH:
-            return Guidance(
-                f"disarm to end, or make it surer: {_throttle_to(wanted, level)}", share
-            )
-        return Guidance(_throttle_to(wanted, level), share)
-    return Guidance(f"hold the throttle and {_held_motion(view, level)}", share)
+    wanted = next((each for each in _HELD_LEVELS if each not in done), LEVELS // 2 + 1)
+    if level not in done:
+        text = f"hold the throttle and {_held_motion(view, level)}"
+    elif len(done) >= LEVELS_ENOUGH:
+        text = f"disarm to end, or make it surer: {_throttle_to(wanted, level)}"
+    else:
+        text = _throttle_to(wanted, level)
+    return Guidance(text, share, missing=missing)
 
 
 def _held_motion(view: View, level: int) -> str:
@@ -343,20 +293,31 @@ def _throttle_to(wanted: int, level: int) -> str:
 def _guide_still(view: View) -> Guidance:
     seconds = level_seconds(view)
     done = [level for level, time in enumerate(seconds) if time >= STEP_S]
-    share = 0.9 * min(len(done) / STEPS_ENOUGH, 1.0)
-    if len(done) >= STEPS_ENOUGH:
-        share += 0.1 * min(view.stable_refits / _STABLE_REFITS, 1.0)
-        if is_settled(view):
-            return Guidance(_ending(view), 1.0, enough=True)
+    shares = {
+        f"{STEPS_ENOUGH} steps of the throttle": min(len(done) / STEPS_ENOUGH, 1.0),
+        "a steady answer": _steadiness(view) if len(done) >= STEPS_ENOUGH else 0.0,
+    }
+    steps, steadiness = shares.values()
+    share, missing = 0.9 * steps + 0.1 * steadiness, _missing(shares)
+    # Who stands still cannot show more than the motors' part: marginal is the best there is.
+    settled = is_settled(view) or view.grade is Grade.MARGINAL
+    if not missing and settled:
+        return Guidance(_ending(view), 1.0, enough=True)
     level = _level(view)
-    if level not in done:
-        return Guidance("hold the throttle where it is", share)
     wanted = next((each for each in range(STEPS_ENOUGH) if each not in done), None)
+    if not view.armed:
+        text = (
+            f"arm and hold {STEPS_ENOUGH} steps of the throttle, only if it is tied down"
+            if wanted is not None
+            else "wait for the answer; every step is held"
+        )
+        return Guidance(text, share, missing=missing)
     if wanted is None:
         wanted = min(done[-1] + 1, LEVELS // 2 + 1) if level < done[-1] else 0
-    if wanted == level:
-        return Guidance("hold the throttle where it is", share)
-    return Guidance(f"only if it is tied down: {_throttle_to(wanted, level)}", share)
+    if level not in done or wanted == level:
+        return Guidance("hold the throttle where it is", share, missing=missing)
+    text = f"only if it is tied down: {_throttle_to(wanted, level)}"
+    return Guidance(text, share, missing=missing)
 
 
 # -------------------------------------------------------------------------- all
@@ -367,6 +328,8 @@ def _ending(view: View) -> str:
         return "that is enough"
     if view.situation is Situation.FLYING:
         return "that is enough: land and disarm to write"
+    if view.situation is Situation.UNSURE:
+        return "that is enough: land, or rest, and disarm to write"
     return "that is enough: lower the throttle and disarm to write"
 
 
@@ -381,19 +344,37 @@ def _sectors(view: View, level: int | None = None) -> set[int]:
 
 
 def _turn(view: View, level: int | None = None) -> str:
-    """Turn towards the nearest direction not yet seen.
+    """Turn towards the nearest direction not yet seen."""
+    if view.attitude is None:
+        return "turn slowly"
+    right, left = _steps_to_missing(view, level)
+    return f"turn slowly to the {'right' if right <= left else 'left'}"
+
+
+def wanted_heading(view: View) -> float | None:
+    """The heading to turn to next, radians; None where every one was seen.
+
+    The sentence of :func:`guide` names the side it lies on.
+    """
+    if view.attitude is None or len(_sectors(view)) == SECTORS:
+        return None
+    right, left = _steps_to_missing(view)
+    turn = right if right <= left else -left
+    return (view.attitude[2] + turn * math.tau / SECTORS) % math.tau
+
+
+def _steps_to_missing(view: View, level: int | None = None) -> tuple[int, int]:
+    """Sectors to turn right, and left, to the nearest one not yet seen.
 
     Notes
     -----
     Turning right by an angle turns the field to the left by it, in body axes: to lower sectors.
     """
-    if view.attitude is None:
-        return "turn slowly"
     missing = set(range(SECTORS)) - _sectors(view, level)
-    here = _sector(view.attitude[2])
+    here = _sector(view.attitude[2]) if view.attitude is not None else 0
     right = next((step for step in range(SECTORS) if (here - step) % SECTORS in missing), 0)
     left = next((step for step in range(SECTORS) if (here + step) % SECTORS in missing), 0)
-    return f"turn slowly to the {'right' if right <= left else 'left'}"
+    return right, left
 
 
 def _turn_more(view: View) -> str:

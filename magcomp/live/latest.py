@@ -17,6 +17,7 @@ from magcomp.model import Vehicle
 _SENSOR_COMPASS = 0x04  # MAV_SYS_STATUS_SENSOR_3D_MAG
 _FIELD_MESSAGES = {1: Message.RAW_IMU, 2: Message.SCALED_IMU2, 3: Message.SCALED_IMU3}
 _STALE_US = 2_000_000
+_MILLI_G = 9.80665e-3
 
 Vector = tuple[float, float, float]
 
@@ -43,6 +44,8 @@ class Now:
         Above home, or above where it was switched on; over the ground in m/s.
     compass_trouble
         The autopilot says that its compass is not healthy.
+    accel
+        Specific force in body axes, m/s², of the first IMU.
     """
 
     stamp_us: int
@@ -56,6 +59,7 @@ class Now:
     height_m: float | None
     speed: float | None
     compass_trouble: bool
+    accel: Vector | None = None
 
 
 class Latest:
@@ -136,6 +140,7 @@ class Latest:
             height_m=_height(rows),
             speed=None if hud is None else _finite(hud["groundspeed"]),
             compass_trouble=_compass_trouble(rows.get(Message.SYS_STATUS)),
+            accel=_accel(rows),
         )
 
 
@@ -172,6 +177,15 @@ def _voltage(rows: Mapping[int, Any]) -> float | None:
 def _height(rows: Mapping[int, Any]) -> float | None:
     position = rows.get(Message.GLOBAL_POSITION_INT)
     return None if position is None else float(position["relative_alt"]) * 1e-3
+
+
+def _accel(rows: Mapping[int, Any]) -> Vector | None:
+    """ArduPilot and PX4 send thousandths of standard gravity in both messages."""
+    for message in (Message.RAW_IMU, Message.SCALED_IMU):
+        if message in rows:
+            x, y, z = _vector(rows[message], ("xacc", "yacc", "zacc"))
+            return (x * _MILLI_G, y * _MILLI_G, z * _MILLI_G) if any((x, y, z)) else None
+    return None
 
 
 def _compass_trouble(row: Any) -> bool:

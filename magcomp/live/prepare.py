@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Mapping
 
 from magcomp import autopilots
-from magcomp.errors import LinkTimeoutError, MagcompError
+from magcomp.errors import LinkError, LinkTimeoutError, MagcompError, unforeseen
 from magcomp.link import Connection, Replay
 from magcomp.link.clock import Clock
 from magcomp.model import Vehicle
@@ -84,7 +84,12 @@ class Preparation:
             if not self.over.is_set():
                 self.failure = error
             self.trouble = str(error)
-        self.over.set()
+        except Exception as error:
+            self.trouble = unforeseen(error)
+            self.failure = LinkError(self.trouble)
+            self.failure.__cause__ = error
+        finally:
+            self.over.set()
 
     def _wait_for_vehicle(self, stop: threading.Event) -> Vehicle | None:
         while not stop.is_set() and not self._connection.ended:

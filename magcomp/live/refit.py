@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from magcomp.analysis.analyse import Options, analyse
-from magcomp.errors import MagcompError
+from magcomp.errors import MagcompError, unforeseen
 from magcomp.live.refresh import refresh
 from magcomp.model import Analysis, MotorFit, Recording
 
@@ -106,7 +106,10 @@ class Refitter:
         while not self._stop.wait(pause):
             begun, cpu = time.monotonic(), time.thread_time()
             full = self._state.analysis is None or self._full_is_due(begun)
-            state = self._analysed() if full else self._refreshed()
+            try:
+                state = self._analysed() if full else self._refreshed()
+            except Exception as error:
+                state = replace(self._state, stable=0, trouble=unforeseen(error))
             cost = time.thread_time() - cpu
             if full:
                 self._full_at = begun

@@ -50,8 +50,10 @@ def refresh(
         try:
             new = readings(recording, before.compass)
             problem = Problem(new, control, reported(found), earth)
-            keep = np.zeros(len(new), dtype=bool)
-            keep[:: max(1, -(-len(new) // most))] = True
+            # Fewer than ``new``: those in a gap of the control quantity are left out.
+            count = len(problem.readings)
+            keep = np.zeros(count, dtype=bool)
+            keep[:: max(1, -(-count // most))] = True
             fits[before.compass] = refit(problem, before, keep)
         except MagcompError:
             continue

@@ -19,6 +19,7 @@ from magcomp.buffer import Buffer
 from magcomp.errors import LinkError, LinkTimeoutError, MagcompError
 from magcomp.link import (
     DEFAULT_RATES,
+    GROUND_STATION_SYSTEM,
     Connection,
     FrameSink,
     Recorder,
@@ -28,6 +29,7 @@ from magcomp.link.clock import Clock, SystemClock
 from magcomp.live.latest import Latest
 from magcomp.live.prepare import Preparation
 from magcomp.live.refit import DEFAULT_SHARE, Refit, Refitter
+from magcomp.live.situation import Manoeuvre
 from magcomp.live.snapshot import LiveSnapshot
 from magcomp.live.tap import Tap
 from magcomp.live.upload import finish_restore, make_plan, read_backup, wait_disarmed, write_plan
@@ -107,6 +109,7 @@ class LiveSession:
         component: int | None = None,
         baud: int | None = None,
         signing_key: bytes | None = None,
+        source_system: int = GROUND_STATION_SYSTEM,
         clock: Clock | None = None,
         rates: Mapping[str, float] = DEFAULT_RATES,
         options: Options | None = None,
@@ -122,7 +125,7 @@ class LiveSession:
             Write all that arrives into this .tlog.
         force
             Overwrite it.
-        system, component, baud, signing_key
+        system, component, baud, signing_key, source_system
             See ``magcomp.link.connect``; the key is 32 bytes from ``read_signing_key``.
         clock, rates, options, refit_share
             See the class.
@@ -146,6 +149,7 @@ class LiveSession:
                 system=system,
                 component=component,
                 key=signing_key,
+                source_system=source_system,
                 sinks=[tap],
                 clock=clock,
             )
@@ -222,6 +226,15 @@ class LiveSession:
     def elapsed_s(self) -> float:
         """Seconds since the session was opened; of the log, where one is replayed."""
         return self._watch.elapsed_s
+
+    @property
+    def manoeuvre(self) -> Manoeuvre | None:
+        """What the user says that is being done, None to find out; may be set at any time."""
+        return self._watch.manoeuvre
+
+    @manoeuvre.setter
+    def manoeuvre(self, said: Manoeuvre | None) -> None:
+        self._watch.manoeuvre = said
 
     @property
     def armed(self) -> bool | None:

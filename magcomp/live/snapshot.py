@@ -14,12 +14,17 @@ from magcomp.autopilots import Autopilot
 from magcomp.buffer import Coverage
 from magcomp.geometry import heading
 from magcomp.link import LinkStatistics
-from magcomp.live.guide import Guidance, Situation
+from magcomp.live.guide import Guidance
 from magcomp.live.latest import Now, Vector
+from magcomp.live.progress import Bound
 from magcomp.live.refit import Refit
+from magcomp.live.situation import Situation
 from magcomp.model import THROTTLE, Analysis, Grade, InForce, MotorFit, Vehicle
 
 _PLAUSIBLE = (150.0, 900.0)
+_RATES_SETTLED_S = 8.0
+_FAST_HZ = 5.0
+_SLOW_SHARE = 0.6
 """mGauss: the earth's field is 220 … 670; motors and a bad calibration add to it."""
 
 
@@ -72,7 +77,10 @@ class LiveSnapshot:
     armed
         None before the first heartbeat.
     elapsed_s
-        Seconds since the first frame.
+        Seconds since the session was opened.
+    recorded_s
+        Seconds of the vehicle's own clock in which attitudes came: it stands while the link is
+        lost.
     recording_path, recording_bytes
         The .tlog being written; None and 0 without one.
     recording
@@ -95,6 +103,13 @@ class LiveSnapshot:
         Throttle levels (tenths) whose attitudes suffice.
     level_seconds
         Seconds at each throttle level.
+    headings
+        Largest throttle at each heading, 0 … 1; NaN where it was never headed. See
+        :data:`magcomp.live.progress.HEADINGS`.
+    wanted_heading_deg
+        Where to turn next; None where every heading was seen.
+    bound
+        What the newest analysis promises at the hover, and those before it.
     situation, guidance
         What is going on, and what to do next.
     warnings
@@ -119,6 +134,7 @@ class LiveSnapshot:
     link_text: str
     armed: bool | None
     elapsed_s: float
+    recorded_s: float
     recording_path: Path | None
     recording_bytes: int
     recording: bool
@@ -133,6 +149,9 @@ class LiveSnapshot:
     coverage: Coverage
     levels_done: tuple[int, ...]
     level_seconds: tuple[float, ...]
+    headings: tuple[float, ...]
+    wanted_heading_deg: float | None
+    bound: Bound | None
     situation: Situation
     guidance: Guidance
     warnings: tuple[str, ...]
@@ -220,6 +239,35 @@ def warnings(
         yield (
             f"a motor compensation by {regressor} is in force ({autopilot.switch} "
             f"{parameters[autopilot.switch]:g}): it is taken into account"
+        )
+
+
+def slow_streams(
+    asked: Mapping[str, float], received: Mapping[str, float], streaming_s: float
+) -> Iterator[str]:
+    """Say where the link brings much less than what was asked for, and what that costs.
+
+    Parameters
+    ----------
+    asked, received
+        Message name to Hz.
+    streaming_s
+        Seconds since the streams were asked for; rates are means over some seconds.
+    """
+    if streaming_s < _RATES_SETTLED_S:
+        return
+    slow = {
+        name: received[name] / rate
+        for name, rate in asked.items()
+        if received.get(name, 0.0) and rate >= _FAST_HZ and received[name] < _SLOW_SHARE * rate
+    }
+    if slow:
+        name = min(slow, key=lambda each: slow[each])
+        yield (
+            f"{name} comes {received[name]:.1f} times a second, though {asked[name]:.0f} were "
+            "asked for: what lies between (MAVProxy needs `set streamrate -1`; a slow radio) "
+            "limits it; fewer readings and coarser times make the answer less sure, so record "
+            "longer"
         )
 
 

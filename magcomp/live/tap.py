@@ -9,11 +9,13 @@ from magcomp.buffer import Buffer
 from magcomp.errors import OutputError
 from magcomp.link import FrameSink, Recorder
 from magcomp.live.latest import Latest
-from magcomp.mavlink.header import message_id
+from magcomp.mavlink.header import message_id, source
 from magcomp.mavlink.messages import Message, decode_frame
 from magcomp.mavlink.records import STAMP_SIZE
+from magcomp.model import Vehicle
 
 _LONGEST_STEP_MS = 1500
+_MOST_SENDERS = 32
 
 
 class Tap:
@@ -44,8 +46,7 @@ class Tap:
         self._taking = True
         self.failure = ""
         self._size = 0
-        self._attitude_ms = 0
-        self._last_attitude_ms = 0
+        self._attitude_ms: dict[tuple[int, int], tuple[int, int]] = {}
 
     @property
     def path(self) -> Path | None:
@@ -62,10 +63,11 @@ class Tap:
         """Frames are still taken."""
         return self._taking
 
-    @property
-    def seconds(self) -> float:
-        """Seconds of the vehicle's clock in which attitudes came; gaps do not count."""
-        return self._attitude_ms * 1e-3
+    def seconds(self, vehicle: Vehicle | None) -> float:
+        """Seconds of the vehicle's clock in which its attitudes came; gaps do not count."""
+        if vehicle is None:
+            return 0.0
+        return self._attitude_ms.get((vehicle.system, vehicle.component), (0, 0))[0] * 1e-3
 
     def add(self, unix_us: int, frame: bytes) -> None:
         """Take one whole frame that arrived at ``unix_us``."""
@@ -95,10 +97,8 @@ class Tap:
                     self.failure = str(error)
 
     def close(self) -> None:
-        """Stop, and remove a file into which nothing came."""
+        """Stop for good."""
         self.stop()
-        if self.path is not None and self._size == 0:
-            self.path.unlink(missing_ok=True)
 
     def _write(self, recorder: Recorder, unix_us: int, frame: bytes) -> None:
         try:
@@ -111,7 +111,11 @@ class Tap:
     def _count(self, frame: bytes) -> None:
         if message_id(frame) != Message.ATTITUDE:
             return
+        sender = source(frame)
         now_ms = int(decode_frame(frame, Message.ATTITUDE)["time_boot_ms"])
-        if 0 < now_ms - self._last_attitude_ms < _LONGEST_STEP_MS:
-            self._attitude_ms += now_ms - self._last_attitude_ms
-        self._last_attitude_ms = now_ms
+        seen_ms, last_ms = self._attitude_ms.pop(sender, (0, now_ms))
+        if 0 < now_ms - last_ms < _LONGEST_STEP_MS:
+            seen_ms += now_ms - last_ms
+        self._attitude_ms[sender] = (seen_ms, now_ms)
+        while len(self._attitude_ms) > _MOST_SENDERS:
+            del self._attitude_ms[next(iter(self._attitude_ms))]

@@ -8,32 +8,38 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from magcomp.errors import unforeseen
 from magcomp.link import (
     Connection,
     GapEnded,
-    GapStarted,
     LinkEvent,
     Replay,
+    SinkFailed,
+    StrangerHeard,
     VehicleFound,
     VehicleRebooted,
 )
 from magcomp.link.clock import Clock
 from magcomp.live.guide import (
     Guidance,
-    SituationWatch,
     View,
     guide,
     level_seconds,
     levels_done,
+    wanted_heading,
 )
 from magcomp.live.latest import Now
 from magcomp.live.prepare import Preparation
+from magcomp.live.progress import Enough, HeadingRing, HoverBound
 from magcomp.live.refit import Refit
-from magcomp.live.snapshot import LiveSnapshot, compasses_now, warnings
+from magcomp.live.situation import Look, Manoeuvre, SituationWatch
+from magcomp.live.snapshot import LiveSnapshot, compasses_now, slow_streams, warnings
 from magcomp.live.tap import Tap
-from magcomp.model import Analysis, Grade, Vehicle
+from magcomp.model import CURRENT, THROTTLE, Analysis, Grade, Vehicle
 
 LOOK_S = 0.2
+_GAP_TOLD_S = 20.0
+"""How long a pilot is told of a gap that is over."""
 _NOTHING = Now(0, None, {}, (), None, None, None, None, None, None, False)
 
 
@@ -65,21 +71,43 @@ class Watch:
         self._refit = refit
         self._opened = clock.monotonic()
         self._situation = SituationWatch()
+        self._ring = HeadingRing()
+        self._hover = HoverBound()
+        self._enough = Enough()
         self._notes: list[str] = []
+        self._slow = ""
+        self._gap = (-math.inf, "")
+
+    @property
+    def manoeuvre(self) -> Manoeuvre | None:
+        """What the user says that is being done; may be set at any time."""
+        return self._situation.manoeuvre
+
+    @manoeuvre.setter
+    def manoeuvre(self, said: Manoeuvre | None) -> None:
+        self._situation.manoeuvre = said
 
     def run(self, stop: threading.Event) -> None:
-        """Watch until stopped."""
+        """Watch until stopped; what goes wrong in one look is told, and the next one follows."""
         while not stop.wait(LOOK_S):
-            for event in self._connection.take_events():
-                self._take(event)
-            vehicle = self._connection.vehicle
-            if vehicle is None:
-                continue
-            now = self._tap.latest.now(vehicle)
-            # By the vehicle's clock: a replay, or a simulation, may be faster than ours.
-            self._situation.update(
-                self._tap.seconds, now.armed, now.attitude, now.height_m, now.speed
-            )
+            try:
+                self._look()
+            except Exception as error:
+                self._note(unforeseen(error))
+
+    def _look(self) -> None:
+        for event in self._connection.take_events():
+            self._take(event)
+        vehicle = self._connection.vehicle
+        if vehicle is None:
+            return
+        now = self._tap.latest.now(vehicle)
+        # By the vehicle's clock: a replay, or a simulation, may be faster than ours.
+        seconds = self._tap.seconds(vehicle)
+        self._situation.update(Look(seconds, now.armed, now.attitude, now.height_m, now.accel))
+        self._ring.look(now.armed, now.attitude, now.throttle)
+        loads = {CURRENT: now.current, THROTTLE: now.throttle}
+        self._hover.look(now.armed, loads, self._refit().analysis)
 
     @property
     def elapsed_s(self) -> float:
@@ -95,7 +123,7 @@ class Watch:
         now = _NOTHING if vehicle is None else latest.now(vehicle)
         parameters = {} if vehicle is None else latest.parameters(vehicle)
         link, refit = self._connection.statistics(), self._refit()
-        view = self._view(now)
+        view = self._view(now, vehicle)
         return LiveSnapshot(
             address=str(self._connection.address),
             vehicle=vehicle,
@@ -103,6 +131,7 @@ class Watch:
             link_text=self._link_text(vehicle, link.up),
             armed=now.armed,
             elapsed_s=self.elapsed_s,
+            recorded_s=self._tap.seconds(vehicle),
             recording_path=self._tap.path,
             recording_bytes=self._tap.size,
             recording=self._tap.taking and not self._tap.failure,
@@ -117,6 +146,9 @@ class Watch:
             coverage=view.coverage,
             levels_done=levels_done(view.coverage),
             level_seconds=level_seconds(view),
+            headings=self._ring.best,
+            wanted_heading_deg=_wanted_deg(view),
+            bound=self._hover.bound,
             situation=view.situation,
             guidance=self._guidance(vehicle, view),
             warnings=self._warnings(now, vehicle, parameters),
@@ -130,31 +162,36 @@ class Watch:
 
     def _take(self, event: LinkEvent) -> None:
         match event:
-            case GapStarted():
-                self._note("the link was lost")
             case GapEnded(duration=duration):
-                self._note(f"the link was gone for {duration:.0f} s")
+                self._gap = (self._clock.monotonic(), f"the link was gone for {duration:.0f} s")
             case VehicleRebooted():
                 self._note("the vehicle rebooted")
             case VehicleFound():
                 self._preparation.trouble = ""
+            case StrangerHeard(where=where):
+                self._note(f"somebody else at {where} speaks in the vehicle's name; it is ignored")
+            case SinkFailed(error=error):
+                self._note(f"what arrives cannot be taken any more: {error}")
 
     def _note(self, text: str) -> None:
-        self._notes = [*self._notes[-4:], text]
+        if text not in self._notes[-1:]:
+            self._notes = [*self._notes[-4:], text]
 
-    def _view(self, now: Now) -> View:
+    def _view(self, now: Now, vehicle: Vehicle | None) -> View:
         refit = self._refit()
+        whose = (None, None) if vehicle is None else (vehicle.system, vehicle.component)
         return View(
             situation=self._situation.situation,
             armed=now.armed,
             throttle=now.throttle,
             attitude=now.attitude,
             height_m=now.height_m,
-            coverage=self._tap.buffer.coverage(),
-            seconds=self._tap.seconds,
+            coverage=self._tap.buffer.coverage(*whose),
+            seconds=self._tap.seconds(vehicle),
             grade=None if refit.analysis is None else refit.analysis.grade,
             stable_refits=refit.stable,
             bound_deg=_bound_deg(refit.analysis),
+            was_enough=self._enough.reached(self._situation.situation),
         )
 
     def _guidance(self, vehicle: Vehicle | None, view: View) -> Guidance:
@@ -162,7 +199,7 @@ class Watch:
             return Guidance("waiting for the vehicle's heartbeat", 0.0)
         if not self._preparation.over.is_set():
             return Guidance("reading the vehicle's calibration", 0.0)
-        return guide(view)
+        return self._enough.look(view.situation, guide(view))
 
     def _link_text(self, vehicle: Vehicle | None, up: bool) -> str:
         if vehicle is None:
@@ -178,7 +215,18 @@ class Watch:
             return ()
         since = self._preparation.streaming_since
         streaming = 0.0 if since is None else self._clock.monotonic() - since
-        found = [*warnings(now, vehicle, parameters, streaming), *reversed(self._notes)]
+        asked, received = self._connection.requested_rates, self._connection.statistics().rates
+        slow = next(slow_streams(asked, received, streaming), "")
+        # The numbers it was first told with: a text that changes all the time is none.
+        self._slow = slow and (self._slow or slow)
+        found = [
+            *warnings(now, vehicle, parameters, streaming),
+            *filter(None, [self._slow]),
+            *reversed(self._notes),
+        ]
+        ended, gap = self._gap
+        if self._clock.monotonic() - ended < _GAP_TOLD_S:
+            found.append(gap)
         if self._preparation.failure is not None:
             found.insert(0, str(self._preparation.failure).rstrip("."))
         if self._tap.failure:
@@ -195,6 +243,11 @@ def _bound_deg(analysis: Analysis | None) -> float:
         for error in result.verdict.heading_error
     ]
     return max(errors, default=math.inf)
+
+
+def _wanted_deg(view: View) -> float | None:
+    wanted = wanted_heading(view)
+    return None if wanted is None else math.degrees(wanted)
 
 
 def _degrees(now: Now) -> tuple[float, float, float] | None:

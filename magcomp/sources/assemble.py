@@ -166,6 +166,8 @@ def _recording(decoded: Decoded, source: str, kind: str) -> Recording:
     parameters = ParameterHistory(tuple(changes), quantities.holds_whole_list(messages))
     heartbeats = messages[Message.HEARTBEAT]
     attitude = quantities.attitude(messages)
+    autopilot = autopilots.named(who.autopilot)
+    fields, raw = autopilot.from_telemetry(quantities.field(messages), parameters.latest)
     return Recording(
         source=source,
         vehicle=Vehicle(
@@ -174,14 +176,14 @@ def _recording(decoded: Decoded, source: str, kind: str) -> Recording:
             system=who.system,
             component=who.component,
             firmware=quantities.firmware(messages),
-            compasses=autopilots.named(who.autopilot).compasses(parameters.latest),
+            compasses=autopilot.compasses(parameters.latest),
             board=quantities.board(messages),
             capabilities=quantities.capabilities(messages),
             uid=quantities.uid(messages),
         ),
         start_unix_s=decoded.start_unix_s,
         duration_s=decoded.duration_s,
-        field=quantities.field(messages),
+        field=fields,
         parameters=parameters,
         report=decoded.report,
         attitude=attitude,
@@ -196,6 +198,7 @@ def _recording(decoded: Decoded, source: str, kind: str) -> Recording:
         armed=Series(heartbeats.time, quantities.armed(heartbeats.table)),
         format=kind,
         other_currents=quantities.other_currents(messages),
+        raw_compasses=raw,
     )
 
 

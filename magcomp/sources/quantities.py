@@ -101,8 +101,7 @@ def current(messages: Messages) -> Series | None:
 def other_currents(messages: Messages) -> dict[int, Series]:
     """Amperes of each battery beside the first, by its number; empty where there is no first.
 
-    A battery that is alone under another number is the first one of a vehicle that is fed its
-    battery over MAVLink, as in a simulation, and SYS_STATUS tells its current.
+    A battery that is alone under another number is the first one.
     """
     if Message.BATTERY_STATUS not in messages:
         return {}
@@ -263,8 +262,16 @@ def _first_battery(messages: Messages, name: str) -> Series | None:
     if Message.BATTERY_STATUS not in messages:
         return None
     time, table = messages[Message.BATTERY_STATUS]
-    rows = (table["id"] == 0) & (table[name] != _ABSENT_CURRENT)
+    rows = _is_first(table) & (table[name] != _ABSENT_CURRENT)
     return _series(time, table[name] / 100.0, rows)
+
+
+def _is_first(table: Table) -> NDArray[np.bool_]:
+    """Battery 0, or the only one there is: a simulation's may have another number."""
+    first = table["id"] == 0
+    if not first.any() and len(table) and (table["id"] == table["id"][0]).all():
+        first[:] = True
+    return np.asarray(first)
 
 
 def _system_status(messages: Messages, name: str) -> Series | None:
@@ -283,7 +290,7 @@ def _cell_sum(messages: Messages) -> Series | None:
     cells: NDArray[Any] = table["voltages"]
     present = cells != _ABSENT_UINT16
     total = np.where(present, cells, 0).sum(axis=1) + table["voltages_ext"].sum(axis=1)
-    return _series(time, total / 1000.0, (table["id"] == 0) & present.any(axis=1))
+    return _series(time, total / 1000.0, _is_first(table) & present.any(axis=1))
 
 
 def _fuller(battery: Series | None, system: Series | None) -> Series | None:

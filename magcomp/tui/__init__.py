@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from functools import partial
 from pathlib import Path
 
 from magcomp.tui.app import MagcompApp
+from magcomp.tui.ascii import is_ascii_only
 from magcomp.tui.services import Services, open_live, read_log
 from magcomp.tui.settings import read_settings, settings_folder
 
@@ -48,7 +51,15 @@ def run(
         read=partial(read_log, component=component),
         open_live=partial(open_live, component=component),
     )
-    app = MagcompApp(target, settings=settings, folder=place, services=services, system=system)
+    terminal = sys.__stderr__  # what Textual draws on
+    app = MagcompApp(
+        target,
+        settings=settings,
+        folder=place,
+        services=services,
+        system=system,
+        ascii_only=is_ascii_only(terminal.encoding if terminal else None, os.environ),
+    )
     if theme:
         app.theme = theme
     app.run()

@@ -8,11 +8,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any, ClassVar
 
+from rich.text import Text
 from textual.app import SystemCommand
 from textual.binding import Binding, BindingType
 from textual.screen import Screen
 
 from magcomp.errors import MagcompError, UsageError
+from magcomp.model import Grade
 from magcomp.tui import fitting, opening, status, writing
 from magcomp.tui.base import BaseApp
 from magcomp.tui.help_text import help_text, key_lines
@@ -27,7 +29,7 @@ from magcomp.tui.messages import (
     WatchingFailed,
 )
 from magcomp.tui.screens.connect import ConnectScreen
-from magcomp.tui.screens.dialogs import Confirm, Help, Message
+from magcomp.tui.screens.dialogs import Help, Message, Quit
 from magcomp.tui.screens.fit import FitScreen
 from magcomp.tui.screens.record import RecordScreen
 from magcomp.tui.screens.review import ReviewScreen
@@ -57,7 +59,7 @@ class MagcompApp(BaseApp):
         Binding("l", "light", "Light", id="app.light"),
         Binding("q", "quit", "Quit", id="app.quit"),
         Binding("ctrl+c,ctrl+q", "quit", "Quit", id="app.interrupt", show=False, priority=True),
-        Binding("ctrl+p", "command_palette", "Palette", id="app.palette", show=False),
+        Binding("ctrl+p", "command_palette", "Find", id="app.palette"),
     ]
 
     def __init__(self, target: str = "", **given: Any) -> None:
@@ -140,8 +142,12 @@ class MagcompApp(BaseApp):
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:  # noqa: ARG002
         """Hide the keys that have nothing to do on this road."""
         road, work = status.road(self.work), self.work
+        here = road.index(self.current_mode) if self.current_mode in road else 0
+        following = road[here + 1] if here + 1 < len(road) else ""
+        rejected = work.analysis is not None and work.analysis.grade is Grade.REJECTED
         shown = {
-            "forward": bool(work.source) and self.current_mode != road[-1],
+            "forward": bool(work.source and following) and not (following == "review" and rejected),
+            "report": work.analysis is not None,
             "backward": self.current_mode != road[0],
             "disconnect": bool(work.source),
             "open_log": not work.source,
@@ -177,6 +183,10 @@ class MagcompApp(BaseApp):
         """Save a parameter file."""
         writing.ask_save(self)
 
+    def action_report(self) -> None:
+        """Save a report."""
+        writing.ask_report(self)
+
     def action_undo(self) -> None:
         """Bring the vehicle back to what it held."""
         writing.ask_undo(self)
@@ -192,10 +202,12 @@ class MagcompApp(BaseApp):
 
     async def action_quit(self) -> None:
         """Quit; ask where results would be lost or a vehicle is being written."""
-        question = status.quit_question(self.work, self.busy.what if self.busy else "")
-        if question and not isinstance(self.screen, Confirm):
-            dialog = Confirm("Quit?", question, yes="Quit", no="Stay")
-            self.push_screen(dialog, lambda sure: self._leave() if sure else None)
+        doing = self.busy.what if self.busy else ""
+        question = status.quit_question(self.work, self.live, doing)
+        if isinstance(self.screen, Quit):
+            return
+        if question:
+            self.push_screen(Quit(question), lambda sure: self._leave() if sure else None)
         else:
             self._leave()
 
@@ -210,11 +222,14 @@ class MagcompApp(BaseApp):
 
         def close() -> None:
             opening.close(self)
-            self.call_from_thread(self.exit)
+            self.call_from_thread(self._end)
 
         self.busy = Busy("closing the link")
         self.redraw()
         self.run_worker(close, thread=True, exit_on_error=False)
+
+    def _end(self) -> None:
+        self.exit(message=Text(self.farewell) if self.farewell else None)
 
     # ---------------------------------------------------------------- palette, themes, keys
 
@@ -230,6 +245,7 @@ class MagcompApp(BaseApp):
         yield SystemCommand("Fit again", "What is recorded so far", self.action_fit)
         yield SystemCommand("Write to vehicle", "After a question", self.action_write)
         yield SystemCommand("Save parameter file", "For a ground station", self.action_save)
+        yield SystemCommand("Save report", "As a page, text or JSON", self.action_report)
         yield SystemCommand("Undo writing", "From the backup", self.action_undo)
         yield SystemCommand("Light or dark", "For sun or workshop", self.action_light)
         yield SystemCommand("Edit settings", "Where the settings file is", self.action_settings)

@@ -11,7 +11,9 @@ from typing import TypeVar
 from rich.text import Text
 from textual.app import App
 
+from magcomp.analysis import Options
 from magcomp.live.snapshot import LiveSnapshot
+from magcomp.tui.ascii import AsciiFilter
 from magcomp.tui.choices import Choice
 from magcomp.tui.messages import SnapshotTaken, WatchingFailed
 from magcomp.tui.next_step import explain
@@ -41,6 +43,8 @@ class BaseApp(App[None]):
         What the app calls; replaced by tests.
     system
         MAVLink system to work with, where several are on a link or in a log.
+    ascii_only
+        The terminal has no Unicode.
     """
 
     def __init__(
@@ -51,8 +55,11 @@ class BaseApp(App[None]):
         folder: Path | None = None,
         services: Services | None = None,
         system: int | None = None,
+        ascii_only: bool = False,
     ) -> None:
         super().__init__()
+        if ascii_only:
+            self._filters.append(AsciiFilter())
         self.target = target
         self.system = system
         self.settings = Settings() if settings is None else settings
@@ -67,6 +74,8 @@ class BaseApp(App[None]):
         self.busy: Busy | None = None
         self.stopping = threading.Event()
         self.choices: tuple[Choice, ...] = ()
+        self.asked = Options()
+        self.files: list[tuple[str, Path]] = []
         self._watcher: Watcher | None = None
 
     # ---------------------------------------------------------------- drawing
@@ -74,7 +83,7 @@ class BaseApp(App[None]):
     @property
     def state(self) -> State:
         """What the screens draw."""
-        return State(self.work, self.writing, self.live, self.busy, self.choices)
+        return State(self.work, self.writing, self.live, self.busy, self.choices, self.asked)
 
     def redraw(self) -> None:
         """Draw the step on the screen, whatever lies over it."""
@@ -110,9 +119,25 @@ class BaseApp(App[None]):
     # ---------------------------------------------------------------- work off the thread
 
     def run_task(
-        self, what: str, task: Callable[[Progress], _T], then: Callable[[_T], None]
+        self,
+        what: str,
+        task: Callable[[Progress], _T],
+        then: Callable[[_T], None],
+        again: Callable[[], object] | None = None,
     ) -> None:
-        """Do something long in a thread; then draw its result, or say what went wrong."""
+        """Do something long in a thread; then draw its result, or say what went wrong.
+
+        Parameters
+        ----------
+        what
+            In words.
+        task
+            Runs in the thread; tells how far it is.
+        then
+            Given its result, on the app's thread.
+        again
+            Asks anew after an error has been told, where the pilot was asked for something.
+        """
         if self.busy is not None:
             self.notify(f"Wait a moment: {self.busy.what}.")
             return
@@ -125,7 +150,7 @@ class BaseApp(App[None]):
             try:
                 result = task(progress)
             except Exception as error:  # whatever it is, the pilot must hear of it in words
-                self.call_from_thread(self._failed, error)
+                self.call_from_thread(self._failed, error, again)
             else:
                 self.call_from_thread(self._done, then, result)
 
@@ -145,22 +170,28 @@ class BaseApp(App[None]):
         then(result)
         self.redraw()
 
-    def _failed(self, error: Exception) -> None:
+    def _failed(self, error: Exception, again: Callable[[], object] | None) -> None:
         self.busy = None
         if self.stopping.is_set():
             self.close_all()
             return
         self.redraw()
-        self.complain(error)
+        self.complain(error, again)
 
     def close_all(self) -> None:
         """Give everything back, then end."""
         raise NotImplementedError
 
-    def complain(self, error: Exception) -> None:
-        """Say what went wrong, and what to do next."""
+    def complain(self, error: Exception, again: Callable[[], object] | None = None) -> None:
+        """Say what went wrong and what to do next; then ``again`` asks anew where it is given."""
         sentence, step = explain(error)
-        self.push_screen(Message("That did not work", sentence, step))
+        message = Message("That did not work", sentence, step)
+
+        def go_on(_: None) -> None:
+            if again is not None:
+                again()
+
+        self.push_screen(message, go_on)
 
     def _fatal_error(self) -> None:
         """End with a sentence where Textual would print a traceback."""
@@ -170,6 +201,18 @@ class BaseApp(App[None]):
         self._close_messages_no_wait()
 
     # ---------------------------------------------------------------- what is remembered
+
+    def note_file(self, kind: str, path: Path) -> None:
+        """Say where a file is when the pilot leaves."""
+        self.files.append((kind, path))
+
+    @property
+    def farewell(self) -> str:
+        """Where everything is that was made, a line a file; empty where nothing was."""
+        rows = [f"{kind:<11} {path}" for kind, path in self.files if path.exists()]
+        if self.writing.in_force:
+            rows.append("The vehicle holds the new parameters.")
+        return "\n".join(rows)
 
     def remember_target(self, target: str) -> None:
         """Put an address or a log at the head of those used lately."""

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from magcomp.analysis import Options
@@ -12,7 +14,7 @@ from magcomp.model import Analysis, Recording
 from magcomp.tui import writing
 from magcomp.tui.base import BaseApp
 from magcomp.tui.pictures import CompassPicture
-from magcomp.tui.screens.dialogs import AskText
+from magcomp.tui.screens.dialogs import AskText, Fault
 from magcomp.tui.services import Progress, fit
 
 _Answer = tuple[Recording, Analysis, Mapping[int, CompassPicture]]
@@ -21,6 +23,7 @@ _Answer = tuple[Recording, Analysis, Mapping[int, CompassPicture]]
 def start(app: BaseApp, options: Options) -> None:
     """Fit the log, or what was recorded so far; the old answer stays until there is a new one."""
     session, recording = app.session, app.work.recording
+    app.asked = options
 
     def task(progress: Progress) -> _Answer:
         used = session.recording() if session is not None else recording
@@ -61,25 +64,33 @@ def ask_time_range(app: BaseApp) -> None:
         "Time range",
         f"Which part to fit, in seconds; the recording is {whole:.0f} s long.",
         (("From", f"{start_s:g}"), ("To", f"{end_s:.0f}")),
+        check=partial(_range_fault, whole),
     )
 
     def take(answer: tuple[str, ...] | None) -> None:
         if answer is None:
             return
-        try:
-            start_, end = (_seconds(text) for text in answer)
-            bounds = (start_ if start_ > 0.0 else -float("inf"), end)
-            change(app, start=bounds[0], end=bounds[1] if end < whole else float("inf"))
-        except UsageError as error:
-            app.complain(error)
+        first, last = map(float, answer)
+        change(
+            app,
+            start=first if first > 0.0 else -math.inf,
+            end=last if last < whole else math.inf,
+        )
 
     app.push_screen(dialog, take)
 
 
-def _seconds(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError as error:
-        raise UsageError(
-            f"A time must be seconds such as 12.5; instead received {text!r}"
-        ) from error
+def _range_fault(whole: float, answer: tuple[str, ...]) -> Fault | None:
+    """What is wrong with a time range of a recording ``whole`` seconds long."""
+    seconds = []
+    for line, text in enumerate(answer):
+        try:
+            seconds.append(float(text))
+        except ValueError:
+            return Fault(line, f"A time must be seconds such as 12.5; instead received {text!r}.")
+    first, last = seconds
+    if not 0.0 <= first < whole:
+        return Fault(0, f"The start must be from 0 to {whole:.0f} s; instead received {first:g} s.")
+    if not first < last:
+        return Fault(1, f"The end must be after the start; instead received {last:g} s.")
+    return None

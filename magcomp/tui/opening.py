@@ -6,13 +6,14 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+from magcomp.analysis import Options
 from magcomp.errors import MagcompError
 from magcomp.link import Replay, SerialPort, parse_address
 from magcomp.model import Recording
 from magcomp.report import words
 from magcomp.tui.base import BaseApp
 from magcomp.tui.choices import choices
-from magcomp.tui.screens.dialogs import AskText, Confirm
+from magcomp.tui.screens.dialogs import AskText, Confirm, Fault
 from magcomp.tui.services import Progress, Session, Simulation, judge_present
 from magcomp.tui.vehicle_card import VehicleCard, card_of_recording
 from magcomp.tui.work import Work, Writing
@@ -35,9 +36,21 @@ def _show(app: BaseApp, ports: tuple[SerialPort, ...]) -> None:
 
 def ask_log(app: BaseApp) -> None:
     """Ask for the path of a log."""
-    recent = (name for name in app.remembered.recent if name.lower().endswith(".tlog"))
-    dialog = AskText("Open a log", "The path of a .tlog.", (("Log", next(recent, "")),))
+    recent = (name for name in app.remembered.recent if Path(name).expanduser().is_file())
+    dialog = AskText(
+        "Open a log",
+        "The path of a .tlog, .BIN or .ulg.",
+        (("Log", next(recent, "")),),
+        check=_log_fault,
+    )
     app.push_screen(dialog, lambda answer: open_target(app, answer[0]) if answer else None)
+
+
+def _log_fault(answer: tuple[str, ...]) -> Fault | None:
+    path = Path(answer[0]).expanduser()
+    if path.is_file():
+        return None
+    return Fault(0, f"There must be a log; instead there is no file {answer[0]!r}.")
 
 
 def open_target(app: BaseApp, target: str) -> None:
@@ -93,6 +106,7 @@ def _when_free(app: BaseApp, then: Callable[[], None]) -> None:
         app.switch_mode("connect")
         app.live = None
         app.writing = Writing()
+        app.asked = Options()
         app.set_work(Work())
         if app.session is None and app.simulation is None:
             then()
@@ -129,12 +143,14 @@ def _open_log(app: BaseApp, path: Path) -> None:
 
 
 def _connect(app: BaseApp, address: str) -> None:
-    def task(_: Progress) -> Session:
+    def task(_: Progress) -> tuple[Session, Path]:
         record = app.services.new_file("recording", ".tlog", None)
         record.parent.mkdir(parents=True, exist_ok=True)
-        return app.services.open_live(address, record, app.system)
+        return app.services.open_live(address, record, app.system), record
 
-    def then(session: Session) -> None:
+    def then(opened: tuple[Session, Path]) -> None:
+        session, record = opened
+        app.note_file("Recording", record)
         if app.simulation is None:
             app.remember_target(address)
         app.set_work(Work(source=address, live=True))

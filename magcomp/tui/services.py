@@ -11,13 +11,14 @@ from pathlib import Path
 from typing import Protocol
 
 from magcomp.analysis import Options, analyse, check
-from magcomp.errors import LinkError, MagcompError
+from magcomp.errors import LinkError, MagcompError, UsageError
 from magcomp.link import SerialPort, serial_ports
 from magcomp.live.session import LiveSession
 from magcomp.live.snapshot import LiveSnapshot
 from magcomp.live.upload import new_file
 from magcomp.model import Analysis, ParameterSet, Recording, Vehicle, Verdict
 from magcomp.report.evidence import compass_plots
+from magcomp.report.files import report_text, write_text
 from magcomp.simulate import Vehicle as SimulatedVehicle
 from magcomp.simulate import scenario, serve
 from magcomp.sources import read
@@ -187,6 +188,27 @@ class Services:
             path = self.folder / f"{name}-{number}{suffix}"
             number += 1
         return path
+
+
+def save_report(
+    path: Path,
+    recording: Recording | None,
+    analysis: Analysis | None,
+    options: Options,
+    *,
+    force: bool,
+) -> None:
+    """Write a report; see :func:`magcomp.report.files.report_text`.
+
+    Raises
+    ------
+    OutputError, UsageError
+        It cannot be written there, or in that form.
+    """
+    if recording is None or analysis is None:
+        raise UsageError("There must be a fit to report; instead nothing is fitted")
+    text = report_text(path.suffix, recording, analysis, options=options)
+    write_text(path, text, force=force)
 
 
 def judge_present(recording: Recording) -> Mapping[int, Verdict]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from magcomp.analysis import Options
 from magcomp.live.snapshot import LiveSnapshot
 from magcomp.tui.choices import Choice
 from magcomp.tui.work import Work, Writing
@@ -44,6 +45,8 @@ class State:
         What is being done; None while nothing is.
     choices
         What can be connected to or opened.
+    asked
+        Options of the fit tried last, whether or not it could be.
     """
 
     work: Work = field(default_factory=Work)
@@ -51,3 +54,4 @@ class State:
     live: LiveSnapshot | None = None
     busy: Busy | None = None
     choices: tuple[Choice, ...] = ()
+    asked: Options = field(default_factory=Options)

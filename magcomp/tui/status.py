@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from magcomp.live.situation import Situation
 from magcomp.live.snapshot import LiveSnapshot
 from magcomp.model import Grade
 from magcomp.report import words
 from magcomp.tui.widgets.top_bar import STEPS, Status
 from magcomp.tui.work import Work
+
+_LINKS = ((0.05, "good"), (0.2, "weak"))
+"""Share of frames lost below which a link is called so."""
 
 WRITING = "writing"
 """What is being done while a vehicle is written."""
@@ -19,16 +23,20 @@ def road(work: Work) -> tuple[str, ...]:
 
 def missing(step: str, work: Work) -> str:
     """Why a step cannot be taken yet; empty where it can."""
-    if step == "connect":
-        return ""
     if not work.source:
-        return "Connect to a vehicle or open a log first."
+        return "" if step == "connect" else "Connect to a vehicle or open a log first."
     if step not in road(work):
         return f"{STEPS[step]} needs a vehicle; this is a log."
     if step == "fit" and work.live and work.card is None:
         return "Wait until the vehicle's calibration is read."
-    if step == "review" and work.analysis is None:
+    return _nothing_to_write(work) if step == "review" else ""
+
+
+def _nothing_to_write(work: Work) -> str:
+    if work.analysis is None:
         return "Fit first: there is nothing to write yet."
+    if work.analysis.grade is Grade.REJECTED:
+        return "The fit is rejected: there is nothing to write."
     return ""
 
 
@@ -57,13 +65,22 @@ def status(work: Work, live: LiveSnapshot | None) -> Status:
     if not live.connected:
         return Status(name, "LINK LOST: trying again", alarm=True)
     state = {True: "ARMED", False: "disarmed", None: ""}[live.armed]
-    return Status(name, f"{state}  link good, {100 * live.link.loss:.0f} % lost".strip())
+    return Status(name, f"{state}  {link_words(live.link.loss)}".strip())
 
 
-def quit_question(work: Work, doing: str) -> str:
+def link_words(loss: float) -> str:
+    """How good a link is, from the share of its frames that is lost."""
+    word = next((word for most, word in _LINKS if loss < most), "bad")
+    return f"link {word}, {100 * loss:.0f} % lost"
+
+
+def quit_question(work: Work, live: LiveSnapshot | None, doing: str) -> str:
     """What would be lost by quitting; empty where nothing."""
     if doing == WRITING:
         return "The vehicle is being written. Quitting puts everything back first. Quit?"
     if work.unwritten:
         return "The results are not written anywhere yet. Quit all the same?"
+    moved = live is not None and live.recording and live.situation is not Situation.GROUND
+    if moved and not work.kept:
+        return "The recording goes on. Quitting ends it; the file stays. Quit?"
     return ""

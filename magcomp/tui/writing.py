@@ -9,10 +9,11 @@ from pathlib import Path
 from magcomp.errors import MagcompError
 from magcomp.model import Grade
 from magcomp.report import words
+from magcomp.report.files import SUFFIXES as REPORT_SUFFIXES
 from magcomp.tui.base import BaseApp
 from magcomp.tui.changes import ChangeRow, after_event, change_rows, left_out_warnings
 from magcomp.tui.screens.dialogs import AskText, Confirm, Message
-from magcomp.tui.services import Progress
+from magcomp.tui.services import Progress, save_report
 from magcomp.tui.status import WRITING
 from magcomp.tui.work import Work, Writing
 from magcomp.writing.events import Event, Outcome
@@ -27,10 +28,11 @@ def prepare(app: BaseApp) -> None:
     if work.analysis is None:
         app.writing = Writing()
         return
-    app.writing = Writing(
+    app.writing = replace(  # what was written stays known, so that it can be undone
+        app.writing,
         rows=change_rows(work.present, work.parameters),
         warnings=tuple(left_out_warnings(work.analysis, work.chosen, work.present)),
-        backup=_backup(app) if work.live else None,
+        result="",
     )
     app.redraw()
 
@@ -51,7 +53,7 @@ def choose(app: BaseApp, compass: int) -> None:
 # ------------------------------------------------------------------------ a file
 
 
-def ask_save(app: BaseApp) -> None:
+def ask_save(app: BaseApp, proposed: str = "") -> None:
     """Ask where to, and save the parameters of the chosen compasses."""
     if app.work.parameters is None:
         app.notify("There is nothing to save: no compass is chosen.", severity="warning")
@@ -59,13 +61,13 @@ def ask_save(app: BaseApp) -> None:
     dialog = AskText(
         "Save a parameter file",
         f"Its end chooses its form: {words.listed(SUFFIXES)}.",
-        (("File", str(_proposed(app.work))),),
+        (("File", proposed or str(_proposed(app.work, ".param"))),),
     )
     app.push_screen(dialog, lambda answer: _save(app, answer[0]) if answer else None)
 
 
-def _proposed(work: Work) -> Path:
-    return Path("compass.param") if work.live else Path(work.source).with_suffix(".param")
+def _proposed(work: Work, suffix: str) -> Path:
+    return Path(f"compass{suffix}") if work.live else Path(work.source).with_suffix(suffix)
 
 
 def _save(app: BaseApp, text: str) -> None:
@@ -85,11 +87,48 @@ def _save_now(app: BaseApp, path: Path, *, force: bool) -> None:
     try:
         write_parameter_file(path, parameters, force=force)
     except MagcompError as error:
-        app.complain(error)
+        app.complain(error, lambda: ask_save(app, str(path)))
         return
+    app.note_file("Parameters", path)
     app.set_work(replace(app.work, kept=str(path)))
     app.writing = replace(app.writing, result=f"saved to {path}")
     app.redraw()
+
+
+def ask_report(app: BaseApp, proposed: str = "") -> None:
+    """Ask where to, and save a report of the fit shown."""
+    if app.work.analysis is None:
+        app.notify("There is nothing to report: fit first.", severity="warning")
+        return
+    dialog = AskText(
+        "Save a report",
+        f"Its end chooses its form: {words.listed(REPORT_SUFFIXES)}.",
+        (("File", proposed or str(_proposed(app.work, ".html"))),),
+    )
+    app.push_screen(dialog, lambda answer: _save_report(app, answer[0]) if answer else None)
+
+
+def _save_report(app: BaseApp, text: str) -> None:
+    path = Path(text).expanduser()
+    if path.is_file():
+        question = f"{path} exists already. Overwrite it?"
+        dialog = Confirm("Overwrite?", question, yes="Overwrite", no="Keep")
+        app.push_screen(dialog, lambda sure: _make_report(app, path, force=True) if sure else None)
+    else:
+        _make_report(app, path, force=False)
+
+
+def _make_report(app: BaseApp, path: Path, *, force: bool) -> None:
+    work = app.work
+
+    def task(_: Progress) -> None:
+        save_report(path, work.recording, work.analysis, work.options, force=force)
+
+    def then(_: None) -> None:
+        app.note_file("Report", path)
+        app.notify(f"The report is in {path}.")
+
+    app.run_task("making the report", task, then, again=lambda: ask_report(app, str(path)))
 
 
 # ------------------------------------------------------------------------ the vehicle
@@ -130,9 +169,7 @@ def _confirm(app: BaseApp, plan: WritePlan) -> None:
         for change in plan.changes
     )
     backup = _backup(app)
-    app.writing = replace(
-        app.writing, rows=rows, backup=backup, warnings=(*app.writing.warnings, *plan.warnings)
-    )
+    app.writing = replace(app.writing, rows=rows, warnings=(*app.writing.warnings, *plan.warnings))
     app.redraw()
     if not rows or backup is None:
         app.notify("The vehicle holds these values already: nothing is to be written.")
@@ -140,7 +177,7 @@ def _confirm(app: BaseApp, plan: WritePlan) -> None:
     compasses = words.compasses(sorted(app.work.chosen))
     lines = [
         f"Write {len(rows)} parameters of {compasses} to {words.vehicle(plan.vehicle)}?",
-        f"Backup: {backup}",
+        f"The old values are saved first, in {backup}",
         *app.writing.warnings,
     ]
     dialog = Confirm("Write to the vehicle?", "\n".join(lines), yes="Write", no="Cancel")
@@ -157,6 +194,8 @@ def _write(app: BaseApp, plan: WritePlan, backup: Path) -> None:
         return session.upload(plan, backup, _follow(app, progress), app.stopping.is_set)
 
     def then(outcome: Outcome) -> None:
+        app.note_file("Backup", backup)
+        app.writing = replace(app.writing, backup=backup)
         if _ended(app, outcome, backup):
             now = {**plan.old, **plan.new, **plan.switches}
             app.writing = replace(
@@ -235,7 +274,9 @@ def _undo(app: BaseApp, plan: WritePlan, backup: Path) -> None:
     )
 
     def then(outcome: Outcome) -> None:
+        app.note_file("Backup", second)
         if _ended(app, outcome, second):
+            app.writing = Writing()
             prepare(app)
             app.writing = replace(app.writing, result="undone: everything is as it was before")
             app.set_work(replace(app.work, kept=""))

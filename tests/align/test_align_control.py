@@ -185,3 +185,34 @@ def test_readings_in_a_gap_of_the_current_are_left_out():
     assert not np.any((times > 20.5) & (times < 39.5))
     assert np.any(times < 20.0)
     assert np.any(times > 40.0)
+
+
+@pytest.mark.parametrize("constant", [0.06, 0.15])
+def test_a_current_that_the_monitor_smooths_is_rebuilt_as_it_was_before(constant: float) -> None:
+    """A shift in time alone leaves what is smoothed flatter than what disturbs the compass."""
+    rng = np.random.default_rng(3)
+    time = np.arange(0.0, 120.0, 0.02)
+    walk = np.convolve(rng.normal(size=len(time)), np.ones(20) / 20, "same")
+    throttle = Series(time, np.clip(0.45 + 0.35 * walk, 0.0, 1.0))
+    true = 60.0 * throttle.value**1.5
+    smooth = np.empty_like(true)
+    smooth[0] = true[0]
+    for row in range(1, len(true)):
+        smooth[row] = smooth[row - 1] + (true[row] - smooth[row - 1]) * (
+            1.0 - np.exp(-0.02 / constant)
+        )
+    told = Series(time[::10], smooth[::10] + rng.normal(scale=0.1, size=len(time[::10])))
+    found = controls(replace(flying(), current=told, throttle=throttle, outputs=None))
+    (rebuilt,) = [each for each in found if "rebuilt" in each.origin]
+    assert rebuilt.origin == "battery current, rebuilt from the throttle"
+    inside = (time > 1.0) & (time < 119.0)
+    shifts = np.arange(-0.1, 0.1, 0.01)
+
+    def slope(series: Series) -> float:
+        """Of the true current on it, at the shift that fits best, as a fit of lags would find."""
+        rows = [np.interp(time[inside] - s, series.time, series.value) for s in shifts]
+        best = max(rows, key=lambda row: np.corrcoef(row, true[inside])[0, 1])
+        return float(np.polyfit(best, true[inside], 1)[0])
+
+    assert slope(rebuilt.series) == pytest.approx(1.0, abs=0.02)
+    assert abs(slope(told) - 1.0) > 0.04

@@ -55,6 +55,7 @@ def test_repeats_of_a_reading_do_not_count_as_readings(flown: Recording) -> None
     ("lacks", "what"),
     [
         ({"field": {}}, "compass"),
+        ({"field": {1: Series(np.arange(9.0), np.arange(27.0).reshape(9, 3))}}, "60 new readings"),
         ({"attitude": None}, "attitude"),
         ({"current": None, "throttle": None}, "throttle"),
         ({"current": Series(np.arange(9.0), np.ones(9)), "throttle": None}, "changes"),

@@ -53,8 +53,34 @@ def test_a_file_that_is_there_is_not_overwritten(tmp_path):
 def test_a_file_that_is_there_is_replaced_by_force(tmp_path):
     path = tmp_path / "a.tlog"
     path.write_bytes(b"worthless")
-    Recorder(path, force=True).close()
-    assert path.read_bytes() == b""
+    frame = FakeVehicle().heartbeat()
+    with Recorder(path, force=True) as recorder:
+        recorder.add(UNIX_US, frame)
+    assert list(records(path.read_bytes())) == [(UNIX_US, frame)]
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_file_that_is_there_stays_until_something_comes(tmp_path):
+    path = tmp_path / "a.tlog"
+    path.write_bytes(b"precious")
+    with Recorder(path, force=True):
+        assert path.read_bytes() == b"precious"
+    assert path.read_bytes() == b"precious"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_file_that_appears_meanwhile_is_not_overwritten(tmp_path):
+    path = tmp_path / "a.tlog"
+    with Recorder(path) as recorder:
+        path.write_bytes(b"precious")
+        with pytest.raises(OutputError, match="already exists"):
+            recorder.add(UNIX_US, FakeVehicle().heartbeat())
+    assert path.read_bytes() == b"precious"
+
+
+def test_where_nothing_comes_no_file_is_left(tmp_path):
+    Recorder(tmp_path / "a.tlog").close()
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("name", ["no-such-directory/a.tlog", ""])

@@ -13,15 +13,14 @@ from hypothesis import strategies as st
 
 from magcomp.buffer import BANDS, LEVELS, SECTORS, Coverage, sphere_cell
 from magcomp.live.guide import (
-    STILL_S,
-    Situation,
-    SituationWatch,
     View,
     guide,
     level_seconds,
     levels_done,
     pilot_is_done,
+    wanted_heading,
 )
+from magcomp.live.situation import Situation
 from magcomp.model import Grade
 
 CELLS = BANDS * SECTORS
@@ -53,52 +52,42 @@ def view(situation, **changes):
     return replace(start, **changes)
 
 
-def watched(*looks, seconds=STILL_S + 1.0):
-    """Situation after looks of (armed, attitude, height, speed), spread over ``seconds``."""
-    watch = SituationWatch()
-    for index, look in enumerate(looks):
-        watch.update(index * seconds / max(len(looks) - 1, 1), *look)
-    return watch.situation
-
-
-# ---------------------------------------------------------------- which situation
-
-
-def test_a_disarmed_vehicle_is_on_the_ground_however_it_is_turned():
-    assert watched((False, (1.5, 0, 0), 0.0, 0.0), (False, LEVEL, 0.0, 0.0)) is Situation.GROUND
-
-
-def test_a_vehicle_that_rises_flies_and_goes_on_flying_when_it_comes_down():
-    ground, up = (True, LEVEL, 100.0, 0.0), (True, LEVEL, 103.0, 0.0)
-    assert watched((False, LEVEL, 100.0, 0.0), ground, up) is Situation.FLYING
-    assert watched((False, LEVEL, 100.0, 0.0), ground, up, ground) is Situation.FLYING
-
-
-def test_a_vehicle_that_moves_over_the_ground_flies_even_without_a_height():
-    assert watched((True, LEVEL, None, 0.1), (True, LEVEL, None, 3.0)) is Situation.FLYING
-
-
-def test_a_vehicle_tipped_over_on_the_spot_is_held():
-    assert watched((True, LEVEL, 0.0, 0.0), (True, (2.0, 0.0, 0.0), 0.2, 0.0)) is Situation.HELD
-
-
-def test_a_vehicle_that_only_turns_level_may_be_hovering_low():
-    turned = (True, (0.0, 0.0, 1.5), 0.5, 0.3)
-    assert watched((True, LEVEL, 0.0, 0.0), turned) is Situation.UNSURE
-
-
-def test_a_vehicle_that_does_not_move_for_long_stands_still():
-    looks = [(True, (0.01, 0.0, 0.02), 0.0, 0.0)] * 5
-    assert watched(*looks) is Situation.STILL
-    assert watched(*looks, seconds=STILL_S - 1.0) is Situation.UNSURE
-
-
-def test_yaw_that_wraps_is_no_turn():
-    near = [(True, (0.0, 0.0, yaw), 0.0, 0.0) for yaw in (math.pi - 0.05, -math.pi + 0.05)]
-    assert watched(*near) is Situation.STILL
-
-
 # ---------------------------------------------------------------- what is said
+
+
+@pytest.mark.parametrize("situation", list(Situation))
+def test_what_was_enough_stays_enough_whatever_comes_after(situation):
+    said = guide(view(situation, was_enough=True))
+    assert said.enough
+    assert said.share_done == 1.0
+
+
+def test_a_disarmed_stand_is_never_told_to_raise_the_throttle():
+    held = coverage(l0=[0], l1=[0], l2=[0], l3=[0], l4=[0])
+    for grade in (None, Grade.MARGINAL, Grade.REJECTED):
+        told = guide(
+            view(Situation.STILL, armed=False, coverage=held, seconds=60.0, grade=grade)
+        ).text
+        assert "raise" not in told
+        assert "lower" not in told
+
+
+def test_steps_that_are_all_held_are_enough_once_the_answer_is_steady():
+    held = coverage(l0=[0], l1=[0], l2=[0], l3=[0], l4=[0])
+    still = view(Situation.STILL, coverage=held, seconds=60.0, grade=Grade.MARGINAL)
+    assert guide(still).missing == ("a steady answer",)
+    assert guide(replace(still, stable_refits=2)).enough
+
+
+@given(yaw=st.floats(-3.1, 3.1), seen=st.sets(st.integers(0, SECTORS - 1), min_size=1, max_size=11))
+def test_the_heading_wanted_lies_on_the_side_that_is_told(yaw, seen):
+    flying = view(
+        Situation.FLYING, attitude=(0.0, 0.0, yaw), coverage=throttles_flown(seen), seconds=90.0
+    )
+    turn = math.remainder(wanted_heading(flying) - yaw, math.tau)
+    if len(seen) == SECTORS - 1 or abs(turn) > 3.1:
+        return  # one sector does not matter, and both ways round are the same
+    assert ("to the left" in guide(flying).text) == (turn < 0.0)
 
 
 def throttles_flown(sectors):
@@ -207,11 +196,20 @@ def test_seconds_and_levels_follow_the_coverage():
         (Situation.HELD, 5.0, 1, False),
         (Situation.HELD, 5.0, 3, True),
         (Situation.GROUND, 99.0, 9, False),
-        (Situation.UNSURE, 99.0, 9, False),
+        (Situation.UNSURE, 99.0, 0, True),
+        (Situation.UNSURE, 1.0, 0, False),
     ],
 )
 def test_disarming_ends_what_has_begun(situation, disarmed_s, levels, done):
     assert pilot_is_done(situation, disarmed_s, levels) is done
+
+
+def test_where_nobody_knows_whether_it_flies_a_good_answer_ends_it_too():
+    seen = coverage(l3=headings(range(SECTORS)))
+    unsure = view(Situation.UNSURE, coverage=seen, seconds=90.0, grade=Grade.GOOD, stable_refits=2)
+    assert guide(unsure).enough
+    assert not guide(replace(unsure, seconds=30.0)).enough
+    assert not guide(replace(unsure, stable_refits=0)).enough
 
 
 # ---------------------------------------------------------------- what is never said

@@ -18,12 +18,13 @@ from magcomp.errors import (
     VehicleRefusedError,
     WriteError,
 )
-from magcomp.live.guide import Situation
 from magcomp.live.session import LiveSession
+from magcomp.live.situation import Situation
 from magcomp.model import Grade, ParameterSet
 from magcomp.simulate import Faults
 from magcomp.sources.tlog import read_tlog
 from magcomp.writing.events import Standing
+from magcomp.writing.exchange import Timing
 from magcomp.writing.journal import read_journal
 
 DEVICE_IDS = (97539, 131874, 263178)
@@ -199,13 +200,13 @@ def test_a_whole_calibration_is_written_and_brought_back(tmp_path):
         assert read_journal(backup).restored
 
 
-def test_a_write_of_three_compasses_takes_under_two_seconds(tmp_path):
+def test_a_write_of_three_compasses_adds_under_two_seconds_to_the_waits_for_storage(tmp_path):
     with alive(vehicle=landed(), speed=1.0) as flown, open_session(flown) as session:
         session.wait_ready(PATIENCE_S)
         plan = session.upload_plan(ParameterSet(COMPENSATION), any_vehicle=True)
         begun = time.monotonic()
         assert session.upload(plan, tmp_path / "old.param").good
-        assert time.monotonic() - begun < 2.0
+        assert time.monotonic() - begun < 3 * Timing().storing + 2.0
 
 
 @pytest.mark.slow

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import struct
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -364,6 +365,52 @@ def test_a_hostile_text_log_is_read_or_refused_in_words(tmp_path_factory, data) 
     path = tmp_path_factory.mktemp("hostile") / "log.log"
     path.write_bytes(b"\n".join(lines))
     read_or_refused(path)
+
+
+SIZE = 300_000
+EMPTY = Form(200, "X", "", "")
+REDEFINED = [
+    Form(BAT.number, "BAT", BAT.kinds, f"TimeUS,Inst,Volt,C{k}") for k in range(SIZE // 112)
+]
+COSTLY = {
+    "headers alone": FMT.definition() + HEAD * (SIZE // 2),
+    "records of three bytes": EMPTY.definition() + (HEAD + bytes([200])) * (SIZE // 3),
+    "three bytes and one more": EMPTY.definition() + (HEAD + bytes([200, 0])) * (SIZE // 4),
+    "a message redefined each time": b"".join(
+        form.definition() + form.record((k, 0, 1.0, 2.0)) for k, form in enumerate(REDEFINED)
+    ),
+    "a parameter that changes each time": b"".join(
+        PARM.record((100_000 * k, "COMPASS_OFS_X", float(k))) for k in range(SIZE // 31)
+    ),
+    "every instance": b"".join(
+        BAT.record((1000 * k, k % 256, 1.0, 2.0)) for k in range(SIZE // 20)
+    ),
+    "a clock that goes back each time": b"".join(
+        BAT.record((10**12 - 10**7 * k, 0, 1.0, 2.0)) for k in range(SIZE // 20)
+    ),
+    "empty lines": b"\n" * SIZE,
+    "lines without columns": b"MAG,\n" * (SIZE // 5),
+    "one line": b"MAG," + b"1," * (SIZE // 2),
+    "columns that are no numbers": b"MAG, 1, 0, x, 3, 4, 5, 6, 7, 8, 9, 1, 1, 4\n" * (SIZE // 44),
+    "formats of everything": b"".join(
+        b"FMT, %d, 9, Z%d, Qf, A,B\n" % (k % 256, k % 999) for k in range(SIZE // 30)
+    ),
+}
+
+
+@pytest.mark.parametrize("what", COSTLY)
+def test_memory_stays_within_a_multiple_of_the_log(tmp_path: Path, what: str) -> None:
+    log = short_flight(2.0)
+    is_text = COSTLY[what].endswith((b"\n", b"1,"))
+    path = tmp_path / "log"
+    path.write_bytes((log.text() if is_text else log.binary()) + COSTLY[what])
+    tracemalloc.start()
+    try:
+        read_or_refused(path)
+        most = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert most < 60 * path.stat().st_size
 
 
 def test_any_bytes_can_be_taken_apart() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,7 +10,9 @@ import numpy as np
 
 from magcomp.buffer import BANDS, LEVELS, SECTORS, Coverage
 from magcomp.link import LinkStatistics, SerialPort
-from magcomp.live.guide import Guidance, Situation
+from magcomp.live.guide import Guidance
+from magcomp.live.progress import Bound
+from magcomp.live.situation import Situation
 from magcomp.live.snapshot import CompassNow, LiveSnapshot
 from magcomp.model import (
     Analysis,
@@ -216,6 +219,7 @@ def snapshot(**changes: object) -> LiveSnapshot:
         link_text="connected",
         armed=True,
         elapsed_s=83.0,
+        recorded_s=83.0,
         recording_path=Path("recording-20250615T150640Z.tlog"),
         recording_bytes=1_240_000,
         recording=True,
@@ -230,8 +234,13 @@ def snapshot(**changes: object) -> LiveSnapshot:
         coverage=Coverage(counts),
         levels_done=(3,),
         level_seconds=(4.0, 0.0, 0.0, 41.0, 30.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+        headings=(*(0.42 + 0.01 * (k % 3) for k in range(10)), *(0.3,) * 3, *(math.nan,) * 11),
+        wanted_heading_deg=200.0,
+        bound=Bound(24.0, "current", (4.1, 3.0, 2.2, 1.7, 1.3)),
         situation=Situation.FLYING,
-        guidance=Guidance("turn slowly to the right", 0.66),
+        guidance=Guidance(
+            "turn slowly to the right", 0.66, missing=("headings", "a steady answer")
+        ),
         warnings=("compass 3 is not used for the heading (COMPASS_USE is 0)",),
         analysis=None,
         grade=Grade.GOOD,

@@ -135,6 +135,7 @@ def app(
     *,
     session: ScriptedSession | None = None,
     settings: Settings | None = None,
+    ascii_only: bool = False,
     **services: Any,
 ) -> MagcompApp:
     """An app on made-up ports, a frozen clock, and a session where one is given."""
@@ -154,6 +155,7 @@ def app(
     return MagcompApp(
         target,
         settings=settings,
+        ascii_only=ascii_only,
         folder=folder / "settings",
         services=Services(**{**usual, **services}),
     )

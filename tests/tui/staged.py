@@ -11,7 +11,7 @@ import made
 import scripted
 from scripted import ScriptedSession, until
 
-from magcomp.live.guide import Situation
+from magcomp.live.situation import Situation
 from magcomp.model import Grade
 from magcomp.tui import MagcompApp, writing
 from magcomp.tui.changes import READ_BACK
@@ -37,7 +37,6 @@ async def _live(pilot: Any, step: str, work: Work, **changes: object) -> None:
     app.follow(ScriptedSession(made.snapshot(**changes)))
     await until(pilot, lambda: app.live)
     writing.prepare(app)
-    app.writing = replace(app.writing, backup=BACKUP)
     app.action_go(step)
     await until(pilot, lambda: app.current_mode == step and app.screen.is_current)
 
@@ -96,7 +95,9 @@ async def review(pilot: Any) -> None:
 
 async def review_question(pilot: Any) -> None:
     await review(pilot)
-    lines = f"Write 13 parameters of compasses 1, 2 and 3?\nBackup: {BACKUP}"
+    lines = (
+        f"Write 13 parameters of compasses 1, 2 and 3?\nThe old values are saved first, in {BACKUP}"
+    )
     pilot.app.push_screen(Confirm("Write to the vehicle?", lines, yes="Write", no="Cancel"))
     await until(pilot, lambda: isinstance(pilot.app.screen, Confirm))
 
@@ -107,7 +108,9 @@ async def review_written(pilot: Any) -> None:
     rows = tuple(replace(row, state=READ_BACK) for row in app.writing.rows)
     result = f"all {len(rows)} parameters read back as written"
     held = made.parameters()
-    app.writing = replace(app.writing, rows=rows, result=result, before=held, in_force=held)
+    app.writing = replace(
+        app.writing, rows=rows, result=result, before=held, in_force=held, backup=BACKUP
+    )
     app.set_work(replace(app.work, kept="the vehicle"))
     app.redraw()
     await pilot.pause()

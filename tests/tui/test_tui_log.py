@@ -14,6 +14,7 @@ from textual.widgets import Input
 from truth import FIXTURES
 
 from magcomp.cli.app import app as command_line
+from magcomp.fit import METHODS
 from magcomp.tui.screens.dialogs import Confirm, Message
 from magcomp.writing.files import read_parameter_file
 
@@ -107,9 +108,39 @@ async def test_a_time_that_is_no_number_is_said_to_be_none(tmp_path):
         await fitted(pilot)
         await pilot.press("t")
         pilot.app.screen.query(Input).first().value = "soon"
+        await press(pilot, "tab", "enter")
+        await until(pilot, lambda: "instead received 'soon'" in screen(pilot.app))
+        assert pilot.app.screen.focused is pilot.app.screen.query(Input).first()
+
+
+async def test_every_method_is_reached_and_one_that_cannot_fit_does_not_end_the_round(tmp_path):
+    async with scripted.app(tmp_path, str(SWEEP)).run_test() as pilot:
+        await fitted(pilot)
+        tried = []
+        for _ in METHODS:
+            await press(pilot, "m")
+            tried.append(pilot.app.asked.method)
+            if isinstance(pilot.app.screen, Message):
+                await press(pilot, "enter")
+        assert sorted(tried) == sorted(METHODS)
+
+
+async def test_the_report_of_what_is_shown_is_saved_and_told_of_on_leaving(tmp_path):
+    path = tmp_path / "sweep.md"
+    app = scripted.app(tmp_path, str(SWEEP))
+    async with app.run_test() as pilot:
+        await fitted(pilot)
+        await press(pilot, "e")
+        app.screen.query_one(Input).value = str(tmp_path / "sweep.doc")
         await press(pilot, "enter")
-        await until(pilot, lambda: isinstance(pilot.app.screen, Message))
-        assert "instead received 'soon'" in screen(pilot.app)
+        await until(pilot, lambda: isinstance(app.screen, Message))
+        await press(pilot, "enter")
+        assert app.screen.query_one(Input).value == str(tmp_path / "sweep.doc")
+        app.screen.query_one(Input).value = str(path)
+        await press(pilot, "enter")
+        await until(pilot, path.is_file)
+        assert "sweep_current.tlog" in path.read_text()
+        assert app.farewell == f"Report      {path}"
 
 
 async def test_the_difference_can_be_saved_and_is_what_was_shown(tmp_path):

@@ -12,10 +12,13 @@ import scripted
 from scripted import ScriptedSession, press, screen, until
 
 from magcomp.errors import LinkError, LinkTimeoutError, VehicleRefusedError, WriteError
-from magcomp.live.guide import Guidance, Situation
+from magcomp.live.guide import Guidance
+from magcomp.live.situation import Situation
 from magcomp.model import Grade, ParameterChange, ParameterHistory
 from magcomp.tui import opening, writing
+from magcomp.tui.screens.connect import AddressInput
 from magcomp.tui.screens.dialogs import Confirm, Message
+from magcomp.tui.status import link_words
 from magcomp.tui.work import Work
 from magcomp.writing.files import read_parameter_file
 
@@ -104,7 +107,10 @@ async def test_recording_shows_everything_and_says_what_to_do_next(tmp_path):
             "66 %",
             "time 01:23",
             "compass 50 Hz",
-            "lost 1 %",
+            "1 % lost",
+            "missing: headings, a steady answer",
+            "at hover at most 1.3° (95 %), falling █▆▅▄▃ at 24 A",
+            "◇ next, 200°",
             "recording-20250615T150640Z.tlog",
             "ARMED",
             "done",
@@ -114,7 +120,7 @@ async def test_recording_shows_everything_and_says_what_to_do_next(tmp_path):
 
 
 async def test_the_map_fills_as_the_vehicle_turns(tmp_path):
-    session = ScriptedSession()
+    session = ScriptedSession(made.snapshot(situation=Situation.HELD))
     async with scripted.app(tmp_path, session=session).run_test() as pilot:
         await connected(pilot)
         await press(pilot, "n")
@@ -135,9 +141,63 @@ async def test_a_lost_link_is_shown_in_words_and_recovered_from_on_the_same_scre
         session.change(connected=False)
         await until(pilot, lambda: "LINK LOST" in screen(pilot.app))
         assert "it goes on when the link is back" in screen(pilot.app)
+        assert "Compasses, as last heard" in screen(pilot.app)
+        assert pilot.app.screen.has_class("-stale")
         session.change(connected=True)
         await until(pilot, lambda: "link good" in screen(pilot.app))
         assert pilot.app.current_mode == "record"
+        assert not pilot.app.screen.has_class("-stale")
+
+
+@pytest.mark.parametrize(("loss", "word"), [(0.01, "good"), (0.12, "weak"), (0.31, "bad")])
+def test_a_link_that_loses_much_is_not_called_good(loss, word):
+    assert link_words(loss) == f"link {word}, {100 * loss:.0f} % lost"
+
+
+async def test_a_compass_is_not_rejected_before_enough_is_recorded(tmp_path):
+    each = (made.compass_now(1, grade=Grade.REJECTED),)
+    session = ScriptedSession(made.snapshot(compasses=each))
+    async with scripted.app(tmp_path, session=session).run_test() as pilot:
+        await connected(pilot)
+        await press(pilot, "n")
+        await until(pilot, lambda: "too early" in screen(pilot.app))
+        assert "REJECTED" not in screen(pilot.app)
+        session.change(guidance=Guidance("that is enough", 1.0, enough=True))
+        await until(pilot, lambda: "REJECTED" in screen(pilot.app))
+
+
+async def test_a_bad_address_is_told_and_what_was_typed_can_be_mended(tmp_path):
+    async with scripted.app(tmp_path).run_test() as pilot:
+        await until(pilot, lambda: pilot.app.choices)
+        await press(pilot, "a", *"udp:x", "enter")
+        await until(pilot, lambda: isinstance(pilot.app.screen, Message))
+        await press(pilot, "enter", "s")
+        field = pilot.app.screen.query_one(AddressInput)
+        assert field.has_focus
+        assert field.value == "udp:xs"
+
+
+async def test_disarming_is_asked_for_only_while_armed(tmp_path):
+    session = disarmed()
+    async with scripted.app(tmp_path, session=session).run_test() as pilot:
+        await fitted(pilot)
+        assert "isarm" not in screen(pilot.app).split("Next")[1]
+        session.change(armed=True)
+        await until(pilot, lambda: "Land and disarm, then press W" in screen(pilot.app))
+
+
+async def test_a_rejected_fit_says_why_first_and_has_no_key_for_writing(tmp_path):
+    app = scripted.app(tmp_path)
+    async with app.run_test() as pilot:
+        await until(pilot, lambda: app.choices)
+        app.set_work(made.work(Grade.REJECTED))
+        app.action_go("fit")
+        await until(pilot, lambda: "Heading error" in screen(app))
+        shown = screen(app)
+        assert shown.index("The current never rose above 8 A") < shown.index("method")
+        assert "n Write" not in shown
+        await press(pilot, "n")
+        assert app.current_mode == "fit"
 
 
 async def test_a_snapshot_that_waits_for_the_link_does_not_hold_up_the_keys(tmp_path):
@@ -193,8 +253,11 @@ async def test_writing_asks_backs_up_shows_each_parameter_and_can_be_undone(tmp_
         await press(pilot, "w")
         await until(pilot, lambda: isinstance(pilot.app.screen, Confirm))
         assert session.held == before
+        assert pilot.app.writing.backup is None
         await press(pilot, "y")
         await until(pilot, lambda: pilot.app.work.kept)
+        assert pilot.app.writing.backup.is_file()
+        assert str(pilot.app.writing.backup) in pilot.app.farewell
         assert {row.state for row in pilot.app.writing.rows} == {"✓ read back"}
         assert "All 13 parameters read back as written." in screen(pilot.app)
         assert session.held["COMPASS_MOTCT"] == 2.0
@@ -410,8 +473,23 @@ async def test_quitting_in_the_middle_of_a_write_puts_everything_back_first(tmp_
     assert session.held == before
 
 
+@pytest.mark.parametrize("key", ["q", "ctrl+c"])
+async def test_leaving_while_a_flight_is_recorded_asks(tmp_path, key):
+    session = ScriptedSession(made.snapshot(situation=Situation.FLYING))
+    async with scripted.app(tmp_path, session=session).run_test() as pilot:
+        await connected(pilot)
+        await press(pilot, "n", key)
+        await until(pilot, lambda: "The recording goes on." in screen(pilot.app))
+        await press(pilot, "ctrl+c")
+        assert isinstance(pilot.app.screen, Confirm)
+        await press(pilot, "n")
+        assert not isinstance(pilot.app.screen, Confirm)
+        assert pilot.app.is_running
+
+
 async def test_quitting_with_nothing_to_lose_does_not_ask_and_closes_the_link(tmp_path):
     session = disarmed()
+    session.change(situation=Situation.GROUND)
     async with scripted.app(tmp_path, session=session).run_test() as pilot:
         await connected(pilot)
         await pilot.press("q")

@@ -11,15 +11,19 @@ import pytest
 import scripted
 from hypothesis import given
 from hypothesis import strategies as st
+from rich.cells import cell_len
 from scripted import screen, until
 from textual.color import Color
 
+from magcomp.live.progress import Bound, HoverBound, hover_bound
 from magcomp.model import Grade, ParameterSet
+from magcomp.tui.ascii import is_ascii_only, plain
 from magcomp.tui.before_after import HeadingPair, HeadingWatch, heading_pairs
 from magcomp.tui.changes import after_event, change_rows
 from magcomp.tui.pictures import round_ticks
 from magcomp.tui.themes import SUN
 from magcomp.tui.widgets.bars import bar
+from magcomp.tui.widgets.live_facts import sparkline, trend
 from magcomp.tui.work import Writing
 from magcomp.writing.events import Mismatch, Outcome, Reason, RollingBack, Standing, Written
 
@@ -80,6 +84,76 @@ def test_in_sunlight_every_colour_stands_out_seven_to_one():
     inks = (SUN.foreground, SUN.primary, SUN.accent, SUN.success, SUN.warning, SUN.error)
     for ink in (*inks, SUN.variables["quiet"]):
         assert (paper + 0.05) / (luminance(ink) + 0.05) >= 7.0
+
+
+def test_the_live_bound_is_that_of_the_worst_compass_worth_writing_at_the_hover():
+    analysis = made.analysis(Grade.REJECTED, Grade.GOOD)
+    bound = hover_bound(analysis, {"current": 25.0, "throttle": 0.4})
+    assert (bound.u, bound.regressor) == (25.0, "current")
+    assert bound.degrees == pytest.approx((0.1 + 0.006 * 25.0,))
+    assert hover_bound(made.analysis(Grade.REJECTED), {}) is None
+
+
+def test_the_hover_is_the_load_of_half_the_flight_without_the_idling():
+    watch = HoverBound()
+    for load, times in ((0.4, 50), (22.0, 9), (24.0, 10), (40.0, 8)):
+        for _ in range(times):
+            watch.look(True, {"current": load}, None)
+    watch.look(False, {"current": 99.0}, made.analysis())
+    assert watch.bound.u == 24.0
+    watch.look(True, {"current": 24.0}, made.analysis())
+    assert len(watch.bound.degrees) == 2
+
+
+@pytest.mark.parametrize(
+    ("degrees", "word"),
+    [
+        ((2.0,), "steady"),
+        ((4.0, 3.0, 2.0), "falling"),
+        ((2.0, 2.02), "steady"),
+        ((1.0, 2.0), "rising"),
+    ],
+)
+def test_a_bound_falls_rises_or_is_steady(degrees, word):
+    assert trend(Bound(24.0, "current", degrees)) == word
+
+
+@given(values=st.lists(st.floats(0.0, 180.0), min_size=1, max_size=60))
+def test_a_sparkline_has_a_sign_for_each_of_the_last_values(values):
+    assert len(sparkline(tuple(values))) == (min(len(values), 12) if max(values) > 0.0 else 0)
+
+
+@given(text=st.text())
+def test_a_terminal_without_unicode_gets_as_many_cells_of_ascii(text):
+    assert plain(text).isascii()
+    assert cell_len(plain(text)) == cell_len(text)
+
+
+@pytest.mark.parametrize(
+    ("encoding", "environment", "only"),
+    [
+        ("utf-8", {"LANG": "en_GB.UTF-8"}, False),
+        ("utf-8", {}, False),
+        ("utf-8", {"LANG": "C"}, True),
+        ("utf-8", {"LANG": "C", "LC_CTYPE": "C.UTF-8"}, True),
+        ("utf-8", {"LANG": "C", "LC_CTYPE": "en_GB.UTF-8"}, False),
+        ("utf-8", {"LANG": "C", "LC_ALL": "C.UTF-8"}, False),
+        ("ascii", {"LANG": "en_GB.UTF-8"}, True),
+        ("ANSI_X3.4-1968", {}, True),
+        (None, {}, False),
+    ],
+)
+def test_who_has_only_ascii_is_known_by_encoding_and_locale(encoding, environment, only):
+    assert is_ascii_only(encoding, environment) is only
+
+
+async def test_every_screen_is_drawn_in_ascii_where_there_is_nothing_else(tmp_path):
+    app = scripted.app(tmp_path, ascii_only=True)
+    async with app.run_test() as pilot:
+        app.set_work(made.work())
+        app.action_go("fit")
+        await until(pilot, lambda: "Heading error" in screen(app))
+        assert scripted.picture(app).isascii()
 
 
 @given(share=st.floats(allow_nan=False), width=st.integers(0, 200))

@@ -19,6 +19,7 @@ from magcomp.tui.screens.step import StepScreen
 from magcomp.tui.vehicle_card import VehicleCard
 
 _TARGET_CELLS = 36
+_ONE_LINE_CELLS = 76
 
 
 class TargetList(OptionList):
@@ -102,7 +103,7 @@ class ConnectScreen(StepScreen):
     HELP = TargetList.HELP
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("o", "app.open_log", "Open log", id="connect.open"),
-        Binding("s", "app.simulate", "Simulated", id="connect.simulate"),
+        Binding("s", "app.simulate", "Simulate", id="connect.simulate"),
         Binding("a", "address", "Address", id="connect.address"),
         Binding("r", "ports", "Rescan", id="connect.rescan"),
         Binding("x", "app.disconnect", "Disconnect", id="connect.close"),
@@ -112,6 +113,7 @@ class ConnectScreen(StepScreen):
     def __init__(self) -> None:
         super().__init__()
         self._choices: tuple[Choice, ...] = ()
+        self._source = ""
 
     def body(self) -> Iterable[Widget]:
         """List and address on the left, the vehicle on the right."""
@@ -137,7 +139,7 @@ class ConnectScreen(StepScreen):
         listing = self.query_one(TargetList)
         kept = listing.highlighted or 0
         listing.clear_options()
-        roomy = self.has_class("-tall")
+        roomy = self.has_class("-tall") or self.size.width < _ONE_LINE_CELLS
         for choice in choices:
             listing.add_option(Option(choice_text(choice, roomy=roomy), id=choice.target))
         if choices:
@@ -148,6 +150,9 @@ class ConnectScreen(StepScreen):
         work, busy, live = self.state.work, self.state.busy, self.state.live
         self._fill(self.state.choices)
         self.query_one(CardView).show(work.card)
+        if work.source != self._source:
+            self._source = work.source
+            self.query_one("#choices").focus()
         if self.has_class("-known") != (work.card is not None):
             self.set_class(work.card is not None, "-known")
             self.query_one("#choices" if work.card is None else "#card").focus()
@@ -177,7 +182,6 @@ class ConnectScreen(StepScreen):
     def on_input_submitted(self, event: Input.Submitted) -> None:
         """Connect to what was typed."""
         if event.value.strip():
-            self.action_choose()
             self.post_message(TargetChosen(event.value.strip()))
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:  # noqa: ARG002

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import ClassVar
 
 from textual.app import ComposeResult
@@ -88,6 +90,35 @@ class Confirm(ModalScreen[bool]):
         self.dismiss(event.button.id == "yes")
 
 
+class Quit(Confirm):
+    """Whether to leave.
+
+    Parameters
+    ----------
+    question
+        What would be lost.
+    """
+
+    def __init__(self, question: str) -> None:
+        super().__init__("Quit?", question, yes="Quit", no="Stay")
+
+
+@dataclass(frozen=True)
+class Fault:
+    """What is wrong with an answer.
+
+    Attributes
+    ----------
+    line
+        Which line it is about, from 0.
+    sentence
+        What is wrong with it.
+    """
+
+    line: int
+    sentence: str
+
+
 class AskText(ModalScreen["tuple[str, ...] | None"]):
     """One or two lines of text; Escape gives None.
 
@@ -97,13 +128,23 @@ class AskText(ModalScreen["tuple[str, ...] | None"]):
         What is asked for.
     fields
         A label and what stands there at first, for each line.
+    check
+        What is wrong with the lines as they are, None where nothing: a fault is shown here, with
+        the focus on its line.
     """
 
     BINDINGS: ClassVar[list[BindingType]] = [Binding("escape", "cancel", "Cancel")]
 
-    def __init__(self, title: str, explanation: str, fields: tuple[tuple[str, str], ...]) -> None:
+    def __init__(
+        self,
+        title: str,
+        explanation: str,
+        fields: tuple[tuple[str, str], ...],
+        check: Callable[[tuple[str, ...]], Fault | None] = lambda _: None,
+    ) -> None:
         super().__init__()
         self._title, self._explanation, self._fields = title, explanation, fields
+        self._check = check
 
     def compose(self) -> ComposeResult:
         """Labels, inputs, buttons."""
@@ -113,6 +154,7 @@ class AskText(ModalScreen["tuple[str, ...] | None"]):
             for label, value in self._fields:
                 yield Label(label)
                 yield Input(value, select_on_focus=True)
+            yield Static(id="fault", markup=False)
             with Horizontal(classes="buttons"):
                 yield Button("Enter  OK", variant="primary", id="ok")
                 yield Button("Esc  Cancel", id="cancel")
@@ -137,7 +179,13 @@ class AskText(ModalScreen["tuple[str, ...] | None"]):
         self._take()
 
     def _take(self) -> None:
-        self.dismiss(tuple(field.value.strip() for field in self.query(Input)))
+        lines = tuple(field.value.strip() for field in self.query(Input))
+        fault = self._check(lines)
+        if fault is None:
+            self.dismiss(lines)
+            return
+        self.query_one("#fault", Static).update(fault.sentence)
+        self.query(Input)[fault.line].focus()
 
 
 class Help(ModalScreen[None]):

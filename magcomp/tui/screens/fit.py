@@ -21,7 +21,7 @@ from magcomp.tui.pictures import AXES, CompassPicture
 from magcomp.tui.screens.step import StepScreen
 from magcomp.tui.widgets.heading_table import HeadingTable
 from magcomp.tui.widgets.plots import ShiftPlot, UnexplainedPlot
-from magcomp.tui.widgets.verdict_text import VerdictText, grade_word
+from magcomp.tui.widgets.verdict_text import ReasonLine, VerdictText, grade_word
 
 VIEWS = {
     "heading": "Heading error",
@@ -57,6 +57,7 @@ and C change method, regressor, time range and compasses, and fit again at once.
         Binding("c", "compasses", "Fit all compasses, or one", id="fit.compasses", show=False),
         Binding("t", "time", "Other time range", id="fit.time", show=False),
         Binding("f", "app.fit", "Fit again", id="fit.again"),
+        Binding("e", "app.report", "Report", id="fit.report"),
         Binding("b", "app.backward", "Back", id="go.back"),
         Binding("n", "app.forward", "Write", id="go.next"),
     ]
@@ -69,6 +70,7 @@ and C change method, regressor, time range and compasses, and fit again at once.
 
     def body(self) -> Iterable[Widget]:
         """Grades, options, progress, and the four views."""
+        yield ReasonLine(id="reason")
         yield Static(id="grades")
         yield Static(id="options")
         yield ProgressBar(total=1.0, show_eta=False, id="progress")
@@ -115,6 +117,7 @@ and C change method, regressor, time range and compasses, and fit again at once.
             self._compass = min(pictures)
         shown = pictures[self._compass]
         self.query_one("#grades", Static).update(grades_line(analysis, self._compass))
+        self.query_one(ReasonLine).show(shown.result)
         if self._drawn == (shown, analysis):
             return
         if self._drawn is None:
@@ -145,7 +148,10 @@ and C change method, regressor, time range and compasses, and fit again at once.
         if analysis is None:
             return "Press F to fit what was recorded."
         if analysis.grade is Grade.REJECTED:
-            return "Nothing to write: do what the verdict says, record again, and fit again."
+            live = self.state.live
+            if live is not None and not live.guidance.enough:
+                return "Too early for an answer: press B, record more, then press N and F."
+            return "Do what the first line says, record again, and fit again. M: other method."
         return "Look at the pictures (V), then press N to see what would be written."
 
     def _show_view(self) -> None:
@@ -176,7 +182,8 @@ and C change method, regressor, time range and compasses, and fit again at once.
 
     def action_method(self) -> None:
         """Fit with the next method."""
-        self._change(method=_after(METHODS, self.state.work.options.method))
+        # From the one tried last: a method that cannot fit this recording must not end the round.
+        self._change(method=_after(METHODS, self.state.asked.method))
 
     def action_regressor(self) -> None:
         """Fit against the next control quantity."""

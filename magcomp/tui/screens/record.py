@@ -12,14 +12,15 @@ from textual.widget import Widget
 from textual.widgets import Static
 
 from magcomp.buffer import LEVELS
+from magcomp.live.situation import Situation
 from magcomp.live.snapshot import LiveSnapshot
 from magcomp.report import words
 from magcomp.tui.screens.step import StepScreen
-from magcomp.tui.widgets.bars import bar
 from magcomp.tui.widgets.coverage_map import CoverageMap, LevelTable
+from magcomp.tui.widgets.heading_ring import WANTED, HeadingRing
+from magcomp.tui.widgets.live_facts import LiveFacts, bound_words
 from magcomp.tui.widgets.live_table import ControlBars, LiveTable
 
-_FIELD_MESSAGES = ("RAW_IMU", "SCALED_IMU2", "SCALED_IMU3")
 _FEW = 2
 _MANY = 6
 
@@ -41,7 +42,6 @@ is enough, press N. You can fit at any time and come back: the recording goes on
 
     def __init__(self) -> None:
         super().__init__()
-        self._facts = ""
         self._mind = ""
 
     def body(self) -> Iterable[Widget]:
@@ -50,18 +50,20 @@ is enough, press N. You can fit at any time and come back: the recording goes on
             with Container(id="now", classes="panel"):
                 yield LiveTable(id="compasses")
             with Horizontal(id="middle"):
+                with Container(id="turned", classes="panel"):
+                    yield HeadingRing(id="ring")
                 with Container(id="seen", classes="panel"):
                     yield CoverageMap(id="map")
                 with Container(id="held", classes="panel"):
                     yield LevelTable(id="levels")
             with Container(id="controls", classes="panel"):
                 yield ControlBars(id="control")
-            yield Static(id="facts")
+            yield LiveFacts(id="facts")
             yield Static(id="mind")
 
     def on_mount(self) -> None:
         """Name the panels."""
-        self.query_one("#now").border_title = "Compasses"
+        self.query_one("#turned").border_title = "Headings, % throttle"
         self.query_one("#seen").border_title = "Attitudes seen"
         self.query_one("#held").border_title = "Throttle levels"
         self.query_one("#controls").border_title = "Motors"
@@ -72,20 +74,25 @@ is enough, press N. You can fit at any time and come back: the recording goes on
         if live is None:
             self.say("Connect to a vehicle first: press B.")
             return
+        self.set_class(not live.connected, "-stale")
+        self.set_class(live.situation in (Situation.HELD, Situation.STILL), "-held")
+        self.query_one("#now").border_title = _compasses_title(live)
+        wanted = live.wanted_heading_deg
+        self.query_one("#turned").border_subtitle = (
+            "all seen" if wanted is None else f"{WANTED} next, {round(wanted) % 360}°"
+        )
         self.query_one(LiveTable).show(live)
         self.query_one(ControlBars).show(live)
+        self.query_one(HeadingRing).show(live)
         self.query_one(CoverageMap).show(live.coverage)
         now = None if live.throttle is None else min(int(live.throttle * LEVELS), LEVELS - 1)
         level_table = self.query_one(LevelTable)
         level_table.show(live.coverage, live.level_seconds, live.levels_done, now)
-        self._show_facts(live)
+        self.query_one(LiveFacts).show(live)
+        self._show_mind(live)
         self.say(busy.sentence if busy is not None else next_sentence(live))
 
-    def _show_facts(self, live: LiveSnapshot) -> None:
-        facts = facts_line(live)
-        if facts.plain != self._facts:
-            self._facts = facts.plain
-            self.query_one("#facts", Static).update(facts, layout=False)
+    def _show_mind(self, live: LiveSnapshot) -> None:
         room = _MANY if self.has_class("-tall") else _FEW
         mind = Content("\n").join(
             Content.assemble((" Mind: ", "bold $warning"), words.sentence(text))
@@ -96,6 +103,12 @@ is enough, press N. You can fit at any time and come back: the recording goes on
             self.query_one("#mind", Static).update(mind)
 
 
+def _compasses_title(live: LiveSnapshot) -> str:
+    """The bound stands above everything: it is what the recording is for."""
+    title = "Compasses" if live.connected else "Compasses, as last heard"
+    return ": ".join(filter(None, (title, bound_words(live))))
+
+
 def next_sentence(live: LiveSnapshot) -> str:
     """What to do next; a lost link comes before everything."""
     if not live.connected:
@@ -103,22 +116,3 @@ def next_sentence(live: LiveSnapshot) -> str:
     if live.guidance.enough:
         return f"{words.sentence(live.guidance.text)} Then press N."
     return words.sentence(live.guidance.text)
-
-
-def facts_line(live: LiveSnapshot) -> Content:
-    """How far, how long, where to, and how well it arrives."""
-    minutes, seconds = divmod(int(live.elapsed_s), 60)
-    share = live.guidance.share_done
-    field = max((live.link.rates.get(name, 0.0) for name in _FIELD_MESSAGES), default=0.0)
-    first = Content.assemble(
-        (" enough   ", "$quiet"),
-        bar(share, 20, style="$success"),
-        f" {100 * share:3.0f} %   time {minutes:02d}:{seconds:02d}",
-        f"   compass {field:.0f} Hz   lost {100 * live.link.loss:.0f} %",
-    )
-    if live.recording_path is None:
-        file = "nothing is written to a file"
-    else:
-        state = "" if live.recording else "stopped: "
-        file = f"{state}{live.recording_path.name}  {live.recording_bytes / 1e6:.1f} MB"
-    return Content("\n").join([first, Content.assemble((" file     ", "$quiet"), file)])

@@ -12,6 +12,7 @@ from textual.content import Content
 from textual.widget import Widget
 from textual.widgets import DataTable, ProgressBar, Static
 
+from magcomp.live.snapshot import LiveSnapshot
 from magcomp.model import Analysis, Grade
 from magcomp.report import words
 from magcomp.tui.changes import ChangeRow
@@ -42,6 +43,7 @@ class ReviewScreen(StepScreen):
         Binding("3", "choose(3)", "Compass 3", id="compass.3", show=False),
         Binding("w", "app.write", "Write", id="review.write"),
         Binding("s", "app.save", "Save", id="review.save"),
+        Binding("e", "app.report", "Report", id="fit.report"),
         Binding("u", "app.undo", "Undo", id="review.undo"),
         Binding("b", "app.backward", "Back", id="go.back"),
         Binding("n", "app.forward", "Verify", id="go.next"),
@@ -56,7 +58,7 @@ class ReviewScreen(StepScreen):
         """Which compasses, the table, where the backup goes, progress and result."""
         yield Static(id="grades")
         with Horizontal(id="difference"):
-            yield ChangeTable(id="changes", cursor_type="row", zebra_stripes=False)
+            yield ChangeTable(id="changes", cursor_type="row", cell_padding=0)
             with VerticalScroll(id="brings", classes="panel", can_focus=False):
                 yield Static(id="brings-text")
         yield Static(id="place")
@@ -66,7 +68,7 @@ class ReviewScreen(StepScreen):
         """Columns, and the focus on the table so that arrows scroll it."""
         table = self.query_one(ChangeTable)
         table.border_title = "Parameters that change"
-        for name, width in (("Parameter", 18), ("Now", 12), ("New", 12), ("", 14)):
+        for name, width in (("Parameter", 16), ("Now", 12), ("New", 13), ("", 14)):
             label = Text(name, justify="right" if name in ("Now", "New") else "left")
             table.add_column(label, key=name or "state", width=width)
         table.focus()
@@ -86,7 +88,9 @@ class ReviewScreen(StepScreen):
         self._fill(writing.rows)
         table = self.query_one(ChangeTable)
         table.border_subtitle = f"{len(writing.rows)} parameters"
-        self.query_one("#place", Static).update(self._place())
+        place = self._place()
+        self.query_one("#place", Static).update(place)
+        self.query_one("#place").display = bool(place.plain)
         self.say(busy.sentence if busy is not None else self._next())
 
     def _show_benefit(self, analysis: Analysis) -> None:
@@ -124,26 +128,33 @@ class ReviewScreen(StepScreen):
 
     def _next(self) -> str:
         work = self.state.work
-        if work.analysis is None:
-            return "There is no fit yet: press B and fit a recording."
-        if work.analysis.grade is Grade.REJECTED:
-            return "Every compass is rejected, so there is nothing to write. Press B."
+        if work.analysis is None or work.analysis.grade is Grade.REJECTED:
+            return "There is nothing to write: press B and look at the fit."
         if not self.state.writing.rows:
             return "Nothing would change. Press 1, 2 or 3 to choose compasses, or B to go back."
         if not work.live:
             return "Press S to save these parameters to a file for your ground station."
         if work.kept:
             return "Press N to see the heading with the motors running. U undoes the writing."
-        return "Disarm, then press W to write to the vehicle, or S to save a file."
+        return how_to_write(self.state.live)
 
     def action_choose(self, compass: int) -> None:
         """Write one compass or leave it."""
         self.post_message(CompassToggled(compass))
 
 
+def how_to_write(live: LiveSnapshot | None) -> str:
+    """What stands between the pilot and writing, and the key for it."""
+    if live is not None and not live.connected:
+        return "The link is lost: wait until it is back, or press S to save a file."
+    if live is not None and live.armed:
+        return "Land and disarm, then press W to write to the vehicle. S saves a file."
+    return "Press W to write to the vehicle, or S to save a file."
+
+
 def chosen_line(analysis: Analysis, chosen: frozenset[int]) -> Content:
     """Which compasses are written: a box for each."""
-    parts = [Content.styled(" Write compass ", "$quiet")]
+    parts = [Content.styled(" Write", "$quiet")]
     for result in analysis.compasses:
         number = result.fit.compass
         rejected = result.verdict.grade is Grade.REJECTED
@@ -168,5 +179,5 @@ def _cells(row: ChangeRow) -> tuple[Text, ...]:
         Text(row.name),
         Text(row.old, justify="right"),
         Text(row.new, justify="right", style="bold"),
-        Text(row.state),
+        Text(f"  {row.state}"),
     )

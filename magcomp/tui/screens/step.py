@@ -29,8 +29,8 @@ class StepScreen(Screen[None]):
 
     STEP: ClassVar[str]
     HELP: ClassVar[str | None] = None
-    HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (110, "-wide")]  # noqa: RUF012 - as in Screen
-    VERTICAL_BREAKPOINTS = [(0, "-short"), (32, "-tall")]  # noqa: RUF012
+    HORIZONTAL_BREAKPOINTS = [(0, "-slim"), (72, "-narrow"), (110, "-wide")]  # noqa: RUF012 - as in Screen
+    VERTICAL_BREAKPOINTS = [(0, "-low"), (24, "-short"), (32, "-tall")]  # noqa: RUF012
     AUTO_FOCUS = ""  # what has the focus follows from the state, not from what is mounted first
 
     def __init__(self) -> None:
@@ -77,7 +77,8 @@ class StepScreen(Screen[None]):
     def _show_keys(self) -> None:
         """Look for the keys anew, but only where they may differ: it is not cheap."""
         work, writing = self.state.work, self.state.writing
-        bindings = work.source, work.live, bool(writing.in_force)
+        grade = None if work.analysis is None else work.analysis.grade
+        bindings = work.source, work.live, bool(writing.in_force), grade
         if bindings != self._bindings_drawn:
             self._bindings_drawn = bindings
             self.refresh_bindings()

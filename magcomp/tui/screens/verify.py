@@ -11,7 +11,7 @@ from textual.content import Content
 from textual.widget import Widget
 from textual.widgets import Static
 
-from magcomp.live.guide import Situation
+from magcomp.live.situation import Situation
 from magcomp.tui.before_after import HeadingPair, HeadingWatch, heading_pairs
 from magcomp.tui.screens.step import StepScreen
 from magcomp.tui.widgets.heading_pairs import HeadingPairs, HeadingPlot

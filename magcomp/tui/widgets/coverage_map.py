@@ -51,15 +51,16 @@ little, `██` enough. A level turn fills one row; tilting fills the others.
 
     def picture(self, data: Seen, width: int, height: int) -> Content:
         """A map whose cells grow with the room."""
-        wide = min(max((width - _NAMES) // SECTORS, 2), 4)
-        high = min(max((height - 1) // BANDS, 1), 2)
+        wide = min(max((width - _NAMES - 5) // SECTORS, 1), 6)
+        high = min(max((height - 1) // BANDS, 1), 4)
         signs = [(sign * wide, style) for sign, style in _SIGNS]
         lines = []
         for name, row in zip(_BAND_NAMES, data.grades, strict=True):
             cells = [signs[value] for value in row]
             lines.append(Content.assemble((f"{name:>5} ", "$quiet"), *cells))
             lines += [Content.assemble(" " * _NAMES, *cells)] * (high - 1)
-        sides = "".join(f"{side:<{3 * wide}}" for side in ("front", "right", "back", "left"))
+        names = ("front", "right", "back", "left")
+        sides = "".join(f"{side[: 3 * wide - 1]:<{3 * wide}}" for side in names)
         foot = f"{'':{_NAMES}}{sides}{100 * data.share:3.0f} %"
         return Content("\n").join([*lines, Content.styled(foot, "$quiet")])
 
@@ -118,7 +119,7 @@ this throttle for an ellipsoid of its own; a flight does not need that.
     def picture(self, data: tuple[LevelRow, ...], width: int, height: int) -> Content:
         """A line a level."""
         rows = [row for row in data if row.held_s >= 0.5 or row.now or height > LEVELS]
-        length = min(max(width - 28, 8), 24)
+        length = min(max(width - 26, 4), 24)
         lines = [Content.styled(" throttle      held  turned", "$quiet")]
         for row in rows:
             pointer = "▸" if row.now else " "
@@ -127,7 +128,7 @@ this throttle for an ellipsoid of its own; a flight does not need that.
                 Content.assemble(
                     f"{pointer}{span} {row.held_s:4.0f} s ",
                     bar(row.sixteenths / 16 / LEVEL_ENOUGH, length, style="$success"),
-                    " done" if row.done else " ",
+                    " done" if row.done else "",
                 )
             )
         if not rows:

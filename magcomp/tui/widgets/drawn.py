@@ -46,3 +46,6 @@ class Drawn(Static, Generic[Data]):
         if not drawn.is_same(self._drawn):
             self._drawn = drawn
             self.update(drawn, layout=self.SETS_HEIGHT)
+            if self.SETS_HEIGHT:
+                # A layout that is under way already would keep the height of the text before.
+                self.call_after_refresh(self.refresh, layout=True)

@@ -10,7 +10,7 @@ from magcomp.tui.pictures import ErrorRow
 from magcomp.tui.widgets.bars import tail
 from magcomp.tui.widgets.drawn import Drawn
 
-_NUMBERS = 9 + 8 + 8 + 8 + 3
+_NUMBERS = 9 + 9 + 10 + 10
 
 
 class HeadingTable(Drawn[tuple[ErrorRow, ...]]):

@@ -2,21 +2,49 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Any
 
 from textual.content import Content
 from textual.events import Click
 from textual.screen import Screen
-from textual.widgets import Static
+
+from magcomp.tui.widgets.drawn import Drawn
 
 
-class KeyBar(Static):
-    """One line of keys. Textual's own footer mounts a widget a key, anew at each change."""
+@dataclass(frozen=True)
+class Key:
+    """A key that does something here.
 
-    def __init__(self) -> None:
-        super().__init__()
-        self._shown = ""
-        self._ends: list[tuple[int, str]] = []
+    Attributes
+    ----------
+    shown, does
+        As displayed, and what it does.
+    pressed
+        The key itself.
+    """
+
+    shown: str
+    does: str
+    pressed: str
+
+    @property
+    def text(self) -> Content:
+        """As it stands in the bar."""
+        return Content.assemble(
+            (f" {self.shown}", "bold $footer-key-foreground"),
+            (f" {self.does} ", "$footer-description-foreground"),
+        )
+
+
+class KeyBar(Drawn[tuple[Key, ...]]):
+    """The keys, in as many lines as they need: none is ever cut off.
+
+    Textual's own footer mounts a widget a key, anew at each change.
+    """
+
+    SETS_HEIGHT = True
 
     def on_mount(self) -> None:
         """Follow the screen's keys."""
@@ -28,19 +56,42 @@ class KeyBar(Static):
 
     def on_click(self, event: Click) -> None:
         """Press the key under the pointer; the bar's whole height counts."""
-        key = next((key for end, key in self._ends if event.x < end), None)
-        if key is not None:
-            self.app.simulate_key(key)
+        lines = _lines(self._data or (), self.size.width)
+        if not lines:
+            return
+        line = lines[min(max(event.y - self.styles.padding.top, 0), len(lines) - 1)]
+        end = 0
+        for key in line:
+            end += key.text.cell_length
+            if event.x < end:
+                self.app.simulate_key(key.pressed)
+                return
+
+    def picture(self, data: tuple[Key, ...], width: int, height: int) -> Content:  # noqa: ARG002
+        """Lines of keys."""
+        lines = _lines(data, width)
+        return Content("\n").join(Content("").join(key.text for key in line) for line in lines)
 
     def _show(self, screen: Screen[Any]) -> None:
-        content, ends = Content(""), []
-        for _, binding, enabled, _ in screen.active_bindings.values():
-            if binding.show and enabled:
-                key = (f" {self.app.get_key_display(binding)}", "bold $footer-key-foreground")
-                what = (f" {binding.description} ", "$footer-description-foreground")
-                content = Content.assemble(content, key, what)
-                ends.append((content.cell_length, binding.key))
-        self._ends = ends
-        if content.plain != self._shown:
-            self._shown = content.plain
-            self.update(content, layout=False)
+        bound = ((binding, enabled) for _, binding, enabled, _ in screen.active_bindings.values())
+        self.draw_data(
+            tuple(
+                Key(self.app.get_key_display(binding), binding.description, binding.key)
+                for binding, enabled in bound
+                if binding.show and enabled
+            )
+        )
+
+
+def _lines(keys: Iterable[Key], width: int) -> list[list[Key]]:
+    """Break a row of keys where the width ends."""
+    lines: list[list[Key]] = []
+    end = width + 1
+    for key in keys:
+        length = key.text.cell_length
+        if end + length > width:
+            lines.append([])
+            end = 0
+        lines[-1].append(key)
+        end += length
+    return lines

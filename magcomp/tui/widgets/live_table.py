@@ -7,16 +7,34 @@ from dataclasses import dataclass
 from textual.content import Content
 
 from magcomp.live.snapshot import CompassNow, LiveSnapshot
+from magcomp.model import Grade
 from magcomp.tui.widgets.bars import bar
 from magcomp.tui.widgets.drawn import Drawn
 from magcomp.tui.widgets.verdict_text import grade_word
 
 _POINTS = ("N", "NE", "E", "SE", "S", "SW", "W", "NW")
 _FULL_MGAUSS = 900.0
+_WITH_BARS = 68
 _SCALES_A = (20.0, 50.0, 100.0, 200.0, 500.0)
 
 
-class LiveTable(Drawn[tuple[CompassNow, ...]]):
+@dataclass(frozen=True)
+class Compasses:
+    """What the compasses say.
+
+    Attributes
+    ----------
+    each
+        By number.
+    early
+        Too little is recorded yet for a verdict against a compass.
+    """
+
+    each: tuple[CompassNow, ...]
+    early: bool
+
+
+class LiveTable(Drawn[Compasses]):
     """Field strength and heading of each compass."""
 
     HELP = """\
@@ -28,26 +46,26 @@ is.
 
     def show(self, live: LiveSnapshot) -> None:
         """Draw every compass that reports."""
-        self.draw_data(live.compasses)
+        self.draw_data(Compasses(live.compasses, not live.guidance.enough))
 
-    def picture(self, data: tuple[CompassNow, ...], width: int, height: int) -> Content:  # noqa: ARG002
+    def picture(self, data: Compasses, width: int, height: int) -> Content:  # noqa: ARG002
         """A line a compass."""
-        length = max(min(width - 64, 30), 6)
+        length = min(width - 62, 60) if width >= _WITH_BARS else 0
         head = f"  compass  strength {'':{length}}   heading   corrected  fit so far"
         lines = [Content.styled(head, "$quiet")]
-        lines += [self._row(compass, length) for compass in data]
-        if not data:
+        lines += [self._row(compass, length, early=data.early) for compass in data.each]
+        if not data.each:
             lines.append(Content("  no compass reports yet"))
         return Content("\n").join(lines)
 
-    def _row(self, compass: CompassNow, width: int) -> Content:
+    def _row(self, compass: CompassNow, width: int, *, early: bool) -> Content:
         mark = " " if compass.healthy else "!"
         style = "$primary" if compass.healthy else "$error"
         return Content.assemble(
             f" {mark}   {compass.number}     {compass.strength:5.0f} mG ",
             bar(compass.strength / _FULL_MGAUSS, width, style=style),
             f"  {direction(compass.heading_deg)}   {direction(compass.heading_corrected_deg)}  ",
-            Content("  –") if compass.grade is None else grade_word(compass.grade),
+            _grade(compass.grade, early=early),
         )
 
 
@@ -100,6 +118,15 @@ moves with one of them.
             ),
         ]
         return Content("\n").join(lines)
+
+
+def _grade(grade: Grade | None, *, early: bool) -> Content:
+    """The judge's word; who has recorded too little is not told that a compass is rejected."""
+    if grade is None:
+        return Content("–")
+    if grade is Grade.REJECTED and early:
+        return Content("… too early")
+    return grade_word(grade)
 
 
 def _control(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -13,6 +14,7 @@ from textual.widgets import Static
 from magcomp.model import CompassResult, Grade
 from magcomp.report import words
 from magcomp.tui.pictures import AXIS_WORDS
+from magcomp.tui.widgets.drawn import Drawn
 
 MARKS = {Grade.GOOD: "●", Grade.MARGINAL: "◐", Grade.REJECTED: "○"}
 STYLES = {Grade.GOOD: "$success", Grade.MARGINAL: "$warning", Grade.REJECTED: "$error"}
@@ -21,6 +23,28 @@ STYLES = {Grade.GOOD: "$success", Grade.MARGINAL: "$warning", Grade.REJECTED: "$
 def grade_word(grade: Grade) -> Content:
     """``● GOOD``: sign, word and colour say the same."""
     return Content.styled(f"{MARKS[grade]} {grade.value.upper()}", f"bold {STYLES[grade]}")
+
+
+class ReasonLine(Drawn[tuple[int, Grade, str]]):
+    """Why a pilot should write a compass's fit, or must not: before any number."""
+
+    SETS_HEIGHT = True
+
+    def show(self, result: CompassResult) -> None:
+        """Draw the first reason of one compass."""
+        reasons = result.verdict.reasons
+        text = words.sentence(reasons[0]) if reasons else ""
+        self.draw_data((result.fit.compass, result.verdict.grade, text))
+
+    def picture(self, data: tuple[int, Grade, str], width: int, height: int) -> Content:  # noqa: ARG002
+        """One line or two; what does not fit stands in the verdict."""
+        compass, grade, reason = data
+        title = "" if grade is Grade.GOOD else f"Compass {compass} is {grade.value}: "
+        lines = textwrap.wrap(
+            f"{title}{reason}", max(width - 2, 20), max_lines=2, placeholder=" … (V: verdict)"
+        )
+        whole = Content("\n".join(f" {line}" for line in lines))
+        return whole.stylize(f"bold {STYLES[grade]}", 0, len(title) + 1) if title else whole
 
 
 class VerdictText(VerticalScroll):

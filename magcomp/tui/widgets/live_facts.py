@@ -1,0 +1,110 @@
+"""How far a recording is: what is enough, what is missing, the bound, and where it goes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from textual.content import Content
+
+from magcomp.live.progress import Bound
+from magcomp.live.snapshot import LiveSnapshot
+from magcomp.report import words
+from magcomp.tui.widgets.bars import bar
+from magcomp.tui.widgets.drawn import Drawn
+
+_FIELD_MESSAGES = ("RAW_IMU", "SCALED_IMU2", "SCALED_IMU3")
+_SPARKS = "▁▂▃▄▅▆▇█"
+_SPARK_CELLS = 12
+_LOOK_BACK = 3
+_STEADY = 0.1
+"""A bound that changes by less than this share is steady."""
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What the lines say.
+
+    Attributes
+    ----------
+    share, missing
+        Done, 0 … 1, and what is missing.
+    file, size
+        Name of the recording, empty where none is made, and its size in words.
+    seconds
+        Recorded, whole.
+    rate
+        Compass messages a second.
+    """
+
+    share: float
+    missing: tuple[str, ...]
+    file: str
+    size: str
+    seconds: int
+    rate: int
+
+
+class LiveFacts(Drawn[Facts]):
+    """Two lines: how far, and where to."""
+
+    def show(self, live: LiveSnapshot) -> None:
+        """Draw a snapshot's."""
+        path = live.recording_path
+        stopped = "" if live.recording else "stopped: "
+        self.draw_data(
+            Facts(
+                round(live.guidance.share_done, 2),
+                live.guidance.missing,
+                "" if path is None else f"{stopped}{path.name}",
+                f"{live.recording_bytes / 1e6:.1f} MB",
+                int(live.recorded_s),
+                round(max((live.link.rates.get(n, 0.0) for n in _FIELD_MESSAGES), default=0.0)),
+            )
+        )
+
+    def picture(self, data: Facts, width: int, height: int) -> Content:  # noqa: ARG002
+        """The lines; of a long name the end counts."""
+        missing = f"  missing: {', '.join(data.missing)}" if data.missing else ""
+        first = Content.assemble(
+            (" enough  ", "$quiet"),
+            bar(data.share, min(max(width // 4, 8), 30), style="$success"),
+            f" {100 * data.share:3.0f} %{missing}",
+        )
+        minutes, seconds = divmod(data.seconds, 60)
+        rest = f"  {data.size}   time {minutes:02d}:{seconds:02d}   compass {data.rate} Hz"
+        room = max(width - 9 - len(rest), 12)
+        file = data.file if len(data.file) <= room else f"…{data.file[1 - room :]}"
+        where = f"{file}{rest}" if data.file else f"nothing is written to a file{rest}"
+        return Content("\n").join([first, Content.assemble((" file    ", "$quiet"), where)])
+
+
+def bound_words(live: LiveSnapshot) -> str:
+    """``at hover at most 1.3° (95 %), falling ▇▅▃▂ at 24 A``; empty before there is a bound."""
+    if live.bound is None:
+        return "" if live.grade is None else "too early for a bound"
+    bound = live.bound
+    at = words.quantity(bound.u, bound.regressor)
+    return (
+        f"at hover at most {bound.degrees[-1]:.1f}° (95 %), {trend(bound)} "
+        f"{sparkline(bound.degrees)} at {at}"
+    )
+
+
+def trend(bound: Bound) -> str:
+    """Whether more recording still helps."""
+    now = bound.degrees[-1]
+    before = bound.degrees[-min(_LOOK_BACK + 1, len(bound.degrees))]
+    if len(bound.degrees) > 1 and now < (1.0 - _STEADY) * before:
+        return "falling"
+    return "rising" if now > (1.0 + _STEADY) * before else "steady"
+
+
+def sparkline(values: tuple[float, ...]) -> str:
+    """The last values as bars of eighths, the largest of all full."""
+    largest = max(values, default=0.0)
+    if largest <= 0.0:
+        return ""
+    return "".join(
+        _SPARKS[min(int(value / largest * len(_SPARKS)), len(_SPARKS) - 1)]
+        for value in values[-_SPARK_CELLS:]
+    )
