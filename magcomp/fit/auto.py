@@ -8,21 +8,16 @@ from dataclasses import replace
 import numpy as np
 
 from magcomp.errors import FitRejectedError, MissingDataError, UsageError
+from magcomp.fit.field_model import FIELD_LAG, REGRESSOR_LAG, SIZE, STRENGTH, lags_of, vertical_of
 from magcomp.fit.flight import (
-    FIELD_LAG,
     GROUPS,
-    REGRESSOR_LAG,
-    SIZE,
-    STRENGTH,
     FlightEstimate,
     Problem,
     correction_of,
-    errors_of,
     estimate,
     estimate_lags,
     is_calibrated,
-    lags_of,
-    vertical_of,
+    near,
 )
 from magcomp.fit.folds import folds
 from magcomp.fit.levels import centres_of_flight, fit_levels, usable_levels, with_line
@@ -38,6 +33,7 @@ from magcomp.model import (
     MotorFit,
     Readings,
     pack,
+    unpack,
 )
 
 METHODS = ("auto", "sweep", "levels", "flight")
@@ -150,15 +146,7 @@ def refit(problem: Problem, fit: MotorFit, keep: BoolArray) -> MotorFit:
             np.zeros(SIZE - CORRECTION_SIZE - 4),
         ]
     )
-    found = estimate(
-        part,
-        _groups(fit),
-        start=start,
-        hold_lags=True,
-        errors=errors_of(part.sample(lags_of(start)), start),
-        with_covariance=False,
-    )
-    return _updated(fit, found)
+    return _updated(fit, near(part, _groups(fit), start))
 
 
 def _with_lags(problem: Problem, fit: MotorFit) -> MotorFit:
@@ -306,12 +294,12 @@ def _groups(fit: MotorFit) -> int:
     return sum(1 for group in GROUPS if group in fit.free)
 
 
-def _updated(fit: MotorFit, found: Estimate) -> MotorFit:
+def _updated(fit: MotorFit, parameters: FloatArray) -> MotorFit:
     return replace(
         fit,
-        correction=correction_of(found),
-        strength=float(found.parameters[STRENGTH]),
-        vertical=vertical_of(found.parameters),
+        correction=unpack(parameters[:CORRECTION_SIZE]),
+        strength=float(parameters[STRENGTH]),
+        vertical=vertical_of(parameters),
     )
 
 

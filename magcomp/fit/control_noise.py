@@ -24,6 +24,7 @@ MOST_SHARE = 0.25
 _LEAST_SIGNAL = 3.0
 _ROUNDS = 25
 _ROBUST = 3.0
+_SETTLED = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +100,10 @@ def noise_of(values: FloatArray, pulls: FloatArray, spread_u: float) -> Noise | 
         precision = np.sum((pulls / noise.sensor) ** 2, axis=1) + 1.0 / noise.control**2
         control = float(np.sqrt(weight @ (error**2 + 1.0 / precision)))
         spread = weight @ (left**2 + pulls**2 / precision[:, None])
+        before = noise.control
         noise = Noise(np.maximum(np.sqrt(spread), 0.2), float(np.clip(control, 1e-3, most)))
+        if abs(noise.control / before - 1.0) < _SETTLED:
+            break
     return noise
 
 

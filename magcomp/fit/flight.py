@@ -21,10 +21,23 @@ from dataclasses import dataclass
 import numpy as np
 
 from magcomp.align import sample, within
-from magcomp.align.low_pass import low_pass
 from magcomp.earth import EarthField
-from magcomp.fit.control_noise import Noise, noise_of, whitened
-from magcomp.fit.robust import ROUNDS, Estimate, Prior, solve, time_blocks
+from magcomp.fit.control_noise import Noise
+from magcomp.fit.field_model import (
+    DIAGONAL,
+    FIELD_LAG,
+    LEAN,
+    OFF_DIAGONAL,
+    REGRESSOR_LAG,
+    SIN_DIP,
+    SIZE,
+    STRENGTH,
+    TILT,
+    errors_of,
+    lags_of,
+    strength_and_dip,
+)
+from magcomp.fit.robust import ROUNDS, Estimate, Prior, one_step, solve, spread_of, time_blocks
 from magcomp.model import (
     CORRECTION_SIZE,
     MOTOR,
@@ -43,18 +56,11 @@ from magcomp.model import (
     unpack,
 )
 
-STRENGTH, SIN_DIP, FIELD_LAG, REGRESSOR_LAG = range(CORRECTION_SIZE, CORRECTION_SIZE + 4)
-TILT, LEAN = (
-    slice(CORRECTION_SIZE + 4, CORRECTION_SIZE + 6),
-    slice(CORRECTION_SIZE + 6, CORRECTION_SIZE + 8),
-)
-SIZE = CORRECTION_SIZE + 8
-
 TILT_WIDTH_RAD = np.radians(0.5)
 """Autopilots level their attitude to about this: constant errors of roll and of pitch."""
 
-LEAN_WIDTH, LEAN_S = 0.1, 4.0
-"""Radians of attitude error a radian of lean held for seconds, and how soon it comes."""
+LEAN_WIDTH = 0.1
+"""Radians of attitude error a radian of lean held for seconds."""
 
 LAG_MEAN_S, LAG_WIDTH_S, LAG_MOST_S = 0.08, 0.1, 0.6
 """AUTOPILOTS.md, Timing: the field lags by 0.05–0.1 s, the current by something of that order."""
@@ -86,7 +92,6 @@ DRIFT_S = 30.0
 _LEAST_BLOCKS = 12
 
 GROUPS = ("motor", "offset", "diagonal", "off-diagonal")
-_DIAGONAL, _OFF_DIAGONAL = slice(6, 9), slice(9, 12)
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,8 +153,8 @@ def prior(problem: Problem, free: int) -> Prior:
     width = np.zeros(SIZE)
     width[MOTOR] = np.inf
     width[OFFSET] = OPEN_OFFSET_MGAUSS if free >= 2 else TRUSTED_OFFSET_MGAUSS
-    width[_DIAGONAL] = OPEN_SOFT_IRON if free >= 3 else 0.0
-    width[_OFF_DIAGONAL] = OPEN_SOFT_IRON if free >= 4 else 0.0
+    width[DIAGONAL] = OPEN_SOFT_IRON if free >= 3 else 0.0
+    width[OFF_DIAGONAL] = OPEN_SOFT_IRON if free >= 4 else 0.0
     # A free shape and a free strength are one number too many: scale is then the model's.
     width[STRENGTH] = (1e-4 if free >= 3 else SCALE_WIDTH) * earth.strength
     width[SIN_DIP] = DIP_WIDTH
@@ -201,11 +206,7 @@ def estimate(
     rounds
         See :func:`magcomp.fit.robust.solve`.
     """
-    known = prior(problem, free)
-    if hold_lags:
-        width = known.width.copy()
-        width[[FIELD_LAG, REGRESSOR_LAG]] = 0.0
-        known = Prior(known.mean, width)
+    known = _with_lags_held(prior(problem, free)) if hold_lags else prior(problem, free)
     begin = known.mean if start is None else np.where(known.width > 0, start, known.mean)
     if hold_lags and start is not None:
         begin[[FIELD_LAG, REGRESSOR_LAG]] = start[[FIELD_LAG, REGRESSOR_LAG]]
@@ -233,10 +234,31 @@ def estimate(
     return FlightEstimate(**vars(found), errors=errors)
 
 
-def errors_of(samples: Samples, parameters: FloatArray) -> Noise | None:
-    """The sizes of the errors at parameters near the solution, shape (SIZE,)."""
-    values, _, pulls = _rows(samples, parameters)
-    return noise_of(values, pulls, float(np.std(samples.u)))
+def near(problem: Problem, free: int, start: FloatArray) -> FloatArray:
+    """The parameters of a part of the readings, from those of all of them.
+
+    Parameters
+    ----------
+    problem
+        A part of the readings.
+    free
+        Groups of :data:`GROUPS` that were open.
+    start
+        What all readings gave, shape (SIZE,); its lags are kept.
+    """
+    samples = problem.sample(lags_of(start))
+    errors = errors_of(samples, start)
+    values, _ = strength_and_dip(samples, start, errors)
+    known = _with_lags_held(prior(problem, free))
+    return one_step(
+        lambda p: strength_and_dip(samples, p, errors), start, known, spread_of(values, 0.2)
+    )
+
+
+def _with_lags_held(known: Prior) -> Prior:
+    width = known.width.copy()
+    width[[FIELD_LAG, REGRESSOR_LAG]] = 0.0
+    return Prior(known.mean, width)
 
 
 def drift_blocks(time: FloatArray) -> IntArray:
@@ -279,11 +301,6 @@ def _doubt(known: Prior) -> Prior:
     return Prior(known.mean, width)
 
 
-def lags_of(parameters: FloatArray) -> Lags:
-    """The two lags among the parameters."""
-    return Lags(float(parameters[FIELD_LAG]), float(parameters[REGRESSOR_LAG]))
-
-
 def is_physical(parameters: FloatArray) -> bool:
     """Whether the soft iron is positive definite and the lags possible.
 
@@ -292,108 +309,6 @@ def is_physical(parameters: FloatArray) -> bool:
     values = np.linalg.eigvalsh(symmetric(parameters[SOFT_IRON]))
     lags = np.abs(parameters[[FIELD_LAG, REGRESSOR_LAG]])
     return bool(values[0] > 0.3 and values[-1] < 3.0 and np.all(lags < LAG_MOST_S))
-
-
-def strength_and_dip(
-    samples: Samples, parameters: FloatArray, noise: Noise | None = None
-) -> tuple[FloatArray, FloatArray]:
-    """Residuals in mGauss of sensor field, shape (n, 2), and derivatives, shape (n, 2, SIZE).
-
-    Parameters
-    ----------
-    samples, parameters
-        Readings, and the parameters in the order of the module's slices, shape (SIZE,).
-    noise
-        Sizes of the errors where those of the control quantity are known too: both residuals are
-        then made independent of each other.
-
-    Notes
-    -----
-    The sensor's noise is alike on its axes, so the distance that counts is that in sensor axes
-    between a reading and the nearest field the model allows: D⁻¹ · (b − M·u) − offset with b the
-    earth's field at the known gravity and *any* heading. The heading is eliminated: of the three
-    components the one along which it moves the reading is left out, and the two that remain are
-    taken along the field (strength) and across it (dip). Slopes are those of the model's field,
-    not of the noisy reading, so noise is not taken for soft iron (errors in variables).
-    """
-    values, slopes, pulls = _rows(samples, parameters)
-    if noise is None:
-        return values, slopes
-    return whitened(values, pulls, noise), whitened(slopes, pulls, noise)
-
-
-def _rows(samples: Samples, parameters: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Residuals, their derivatives, and their change by one unit of u, as they come."""
-    correction = unpack(parameters[:CORRECTION_SIZE])
-    strength, sine = parameters[STRENGTH], np.clip(parameters[SIN_DIP], -0.999, 0.999)
-    cosine = np.sqrt(1.0 - sine**2)
-    inverse: FloatArray = np.linalg.inv(correction.soft_iron).astype(np.float64)
-    corrected = correction.apply(samples.raw, samples.u)
-    down = samples.down
-    level = corrected - np.einsum("ij,ij->i", corrected, down)[:, None] * down
-    north = level / np.maximum(np.linalg.norm(level, axis=1), 1e-9)[:, None]
-    earth = strength * (cosine * north + sine * down)
-    axes = _axes(earth, down, inverse)
-    apart = (corrected - earth) @ inverse.T
-    pulled = [axis @ inverse for axis in axes]
-    slopes = np.empty((len(samples), 2, SIZE))
-    leaning = _leaning(samples)
-    for kind in range(2):
-        # A turn w of the body moves the field in body axes by w × b, which b × pulled weighs.
-        turned = np.cross(earth, pulled[kind])
-        slopes[:, kind, TILT] = -turned[:, :2]
-        slopes[:, kind, LEAN] = -turned[:, :2] * leaning
-        slopes[:, kind, FIELD_LAG] = np.einsum(
-            "ij,ij->i", turned, np.cross(down, samples.down_rate)
-        )
-    values = np.stack([np.einsum("ij,ij->i", axis, apart) for axis in axes], axis=1)
-    values += slopes[:, :, CORRECTION_SIZE + 4 :] @ parameters[CORRECTION_SIZE + 4 :]
-    pulls = np.stack([one @ correction.motor for one in pulled], axis=1)
-    centred = (earth - np.multiply.outer(samples.u, correction.motor)) @ inverse.T
-    for kind, (axis, pull) in enumerate(zip(axes, pulled, strict=True)):
-        rows = slopes[:, kind, :]
-        rows[:, MOTOR] = pull * samples.u[:, None]
-        rows[:, OFFSET] = axis
-        rows[:, _DIAGONAL] = pull * centred
-        for column, (i, j) in enumerate(((0, 1), (0, 2), (1, 2)), start=9):
-            rows[:, column] = pull[:, i] * centred[:, j] + pull[:, j] * centred[:, i]
-        rows[:, STRENGTH] = -np.einsum("ij,ij->i", pull, earth) / strength
-        rows[:, SIN_DIP] = -strength * np.einsum("ij,ij->i", pull, down - sine / cosine * north)
-        rows[:, REGRESSOR_LAG] = (
-            np.einsum("ij,ij->i", axis, samples.raw_rate) - pulls[:, kind] * samples.u_rate
-        )
-    return values, slopes, pulls
-
-
-def _axes(
-    earth: FloatArray, down: FloatArray, inverse: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Unit vectors in sensor axes along the field and across it, both square to a turn."""
-    turn = np.cross(down, earth) @ inverse.T
-    turn /= np.maximum(np.linalg.norm(turn, axis=1), 1e-9)[:, None]
-    along = earth @ inverse.T
-    along -= np.einsum("ij,ij->i", along, turn)[:, None] * turn
-    along /= np.maximum(np.linalg.norm(along, axis=1), 1e-9)[:, None]
-    return along, np.cross(turn, along)
-
-
-def _leaning(samples: Samples) -> FloatArray:
-    """Roll and pitch, slowly followed: what acceleration does to an attitude filter, (n, 2).
-
-    A multirotor accelerates where it leans, and its attitude filter takes the acceleration for
-    gravity within a few seconds.
-    """
-    if len(samples) < 2:
-        return np.zeros((len(samples), 2))
-    step = max(float(np.median(np.diff(samples.time))), 1e-3)
-    share = step / (LEAN_S + step)
-    tilt = samples.attitude[:, :2] - np.median(samples.attitude[:, :2], axis=0)
-    return low_pass(tilt, share)
-
-
-def vertical_of(parameters: FloatArray) -> float:
-    """Downward part of the earth's field, mGauss."""
-    return float(parameters[STRENGTH] * parameters[SIN_DIP])
 
 
 def correction_of(found: Estimate) -> Correction:
