@@ -45,11 +45,11 @@ def anywhere(luck: np.random.Generator, most: int = MESSAGES) -> int:
     return int(luck.integers(1, most))
 
 
-BAD = {"loss": 0.3, "latency_s": 1.0, "reordering": 0.1, "duplication": 0.1}
+BAD = Faults(loss=0.3, latency_s=1.0, reordering=0.1, duplication=0.1)
 
 KINDS: dict[str, Maker] = {
     "clean": lambda _: Storm(Faults()),
-    "30 % loss, 1 s latency": lambda _: Storm(Faults(**BAD)),
+    "30 % loss, 1 s latency": lambda _: Storm(BAD),
     "replies 5 s late": lambda _: Storm(Faults(latency_s=2.5, loss=0.05)),
     "replies 5 s late, reboot": lambda luck: Storm(
         Faults(latency_s=2.5, reboot_at=anywhere(luck, 4000))
