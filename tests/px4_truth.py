@@ -20,6 +20,9 @@ from magcomp.geometry import body_from_earth, heading, wrap_angle
 SHARED = Path(__file__).parents[2] / "shared"
 RECORDINGS = SHARED / "recordings_px4"
 
+FLOWN_THRUST = 0.8
+"""The most that flight_thrust asks for."""
+
 FloatArray = NDArray[np.float64]
 
 AT_START = {"OFF": (0.0, 0.0, 0.0), "SCALE": (1.0, 1.0, 1.0), "ODIAG": (0.0, 0.0, 0.0)}
@@ -72,7 +75,7 @@ def of_document(path: Path) -> Truth:
         sensors=sensors,
         earth=np.array(document["earth_ned_gauss"]),
         declination=np.radians(document["declination_deg"]),
-        top=1.0 if by_thrust else document["current_A"][1] / 1000.0,
+        top=FLOWN_THRUST if by_thrust else document["current_A"][1] / 1000.0,
     )
 
 

@@ -174,8 +174,10 @@ def _corrections(
     periods, stretch = np.unique(np.append(period, last), return_inverse=True)
     in_force: list[InForce] = []
     number = np.empty(len(periods), dtype=np.intp)
-    for index, moment in enumerate(moments[periods].tolist()):
-        now = autopilot.in_force_at(recording.parameters, compass, moment, armed=recording.armed)
+    forces = autopilot.in_force_over(
+        recording.parameters, compass, moments[periods].tolist(), armed=recording.armed
+    )
+    for index, now in enumerate(forces):
         if not in_force or not _corrects_alike(now, in_force[-1]):
             in_force.append(now)
         number[index] = len(in_force) - 1

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -211,16 +211,20 @@ class ArduPilot:
         """Every parameter acts at once, armed or not."""
         return in_force(calibration(values, compass))
 
-    def in_force_at(
+    def in_force_at(self, parameters: ParameterHistory, compass: int, time: float) -> InForce:
+        """Every parameter acts from its report, armed or not."""
+        return in_force(calibration_at(parameters, compass, time), unseen(parameters, compass))
+
+    def in_force_over(
         self,
         parameters: ParameterHistory,
         compass: int,
-        time: float,
+        times: Sequence[float],
         *,
-        armed: Series | None = None,  # noqa: ARG002
-    ) -> InForce:
-        """Every parameter acts from its report, armed or not."""
-        return in_force(calibration_at(parameters, compass, time), unseen(parameters, compass))
+        armed: Series | None,  # noqa: ARG002
+    ) -> tuple[InForce, ...]:
+        """Armed or not."""
+        return tuple(self.in_force_at(parameters, compass, time) for time in times)
 
     def regressor(self, values: Mapping[str, float]) -> str | None:
         """COMPASS_MOTCT serves all compasses."""
@@ -313,6 +317,13 @@ class ArduPilot:
     def reading_notes(self, recording: Recording) -> tuple[str, ...]:  # noqa: ARG002
         """None: the messages say what they are."""
         return ()
+
+    def deaf_hint(self) -> str:
+        """SYSID_ENFORCE; since 4.7 a bit of MAV_OPTIONS, and the number is MAV_GCS_SYSID."""
+        return (
+            "with SYSID_ENFORCE on, it listens only to the ground station whose number is its "
+            "SYSID_MYGCS: give that number with --source-system"
+        )
 
     def no_compass_hint(self) -> str:
         """The switch of all compasses, and the message of the first."""

@@ -6,7 +6,7 @@ its compass parameters; it asks the implementation, which :func:`magcomp.autopil
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Protocol
@@ -286,20 +286,37 @@ class Autopilot(Protocol):
         """What given parameters do to a compass; nothing counts as unseen."""
         ...
 
-    def in_force_at(
-        self,
-        parameters: ParameterHistory,
-        compass: int,
-        time: float,
-        *,
-        armed: Series | None = None,
-    ) -> InForce:
+    def in_force_at(self, parameters: ParameterHistory, compass: int, time: float) -> InForce:
         """What was in force at a time, in seconds; −∞ is the beginning.
 
         Raises
         ------
         ParameterFileError
             A parameter that acts on this compass is not a finite number.
+        """
+        ...
+
+    def in_force_over(
+        self,
+        parameters: ParameterHistory,
+        compass: int,
+        times: Sequence[float],
+        *,
+        armed: Series | None,
+    ) -> tuple[InForce, ...]:
+        """What was in force at each of many times, in the time of one look at the history.
+
+        Parameters
+        ----------
+        times
+            Seconds, in order.
+        armed
+            1 armed, 0 disarmed, where known: a firmware may take values over only while disarmed.
+
+        Raises
+        ------
+        ParameterFileError
+            As :meth:`in_force_at`.
         """
         ...
 
@@ -406,6 +423,10 @@ class Autopilot(Protocol):
 
     def reading_notes(self, recording: Recording) -> tuple[str, ...]:
         """What a user must know of how the readings were understood, a sentence each."""
+        ...
+
+    def deaf_hint(self) -> str:
+        """What to look for where a vehicle speaks but answers nothing; a clause."""
         ...
 
     def no_compass_hint(self) -> str:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping
+from bisect import bisect_right
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -179,19 +180,25 @@ class Px4:
         """As after a start with these values."""
         return in_force(after_start(values, compass), sensor_to_body(values, compass))
 
-    def in_force_at(
+    def in_force_at(self, parameters: ParameterHistory, compass: int, time: float) -> InForce:
+        """What of the parameters had been taken over by a vehicle that was never armed."""
+        return self.in_force_over(parameters, compass, (time,), armed=None)[0]
+
+    def in_force_over(
         self,
         parameters: ParameterHistory,
         compass: int,
-        time: float,
+        times: Sequence[float],
         *,
-        armed: Series | None = None,
-    ) -> InForce:
+        armed: Series | None,
+    ) -> tuple[InForce, ...]:
         """What of the parameters had been taken over."""
         found = stretches(parameters, compass, armed)
-        now = next(calibration for since, calibration in reversed(found) if since <= time)
         rotation = sensor_to_body(parameters.latest, compass)
-        return in_force(now, rotation, unseen(parameters, compass))
+        missing = unseen(parameters, compass)
+        forces = [in_force(calibration, rotation, missing) for _, calibration in found]
+        since = [time for time, _ in found]
+        return tuple(forces[bisect_right(since, time) - 1] for time in times)
 
     def regressor(self, values: Mapping[str, float]) -> str | None:
         """CAL_MAG_COMP_TYP serves all compasses; values that the firmware does not know are off."""
@@ -289,6 +296,10 @@ class Px4:
             "telemetry does not say which compass is which: its messages are taken for "
             f"{named} by how well each calibration fits; {_OWN_LOG} to be sure",
         )
+
+    def deaf_hint(self) -> str:
+        """It takes every ground station; a link may carry one way only."""
+        return "does the link carry anything to the vehicle, or only from it?"
 
     def no_compass_hint(self) -> str:
         """Telemetry sends no compass by itself."""

@@ -8,6 +8,7 @@ the heading less, so that the same is in force whether the vehicle is restarted 
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
@@ -59,11 +60,14 @@ def _nearest(
 ) -> FloatArray:
     """The vector that is taken over whichever was in force before, at the least cost."""
     befores = tuple(befores)
-    sound = (
-        candidate
-        for candidate in _candidates(wanted, befores, zone, weight)
-        if all(_is_taken(candidate, before, zone) for before in befores)
-    )
+    for candidates in (_near(wanted, befores, zone, weight), _around(wanted, zone)):
+        sound = [
+            candidate
+            for candidate in candidates
+            if all(_is_taken(candidate, before, zone) for before in befores)
+        ]
+        if sound:
+            break
     return min(sound, key=lambda each: float(np.linalg.norm(weight @ (each - wanted))))
 
 
@@ -71,7 +75,7 @@ def _is_taken(vector: FloatArray, before: FloatArray, zone: float) -> bool:
     return np.array_equal(vector, before) or float(np.linalg.norm(vector - before)) > zone * 1.01
 
 
-def _candidates(
+def _near(
     wanted: FloatArray, befores: tuple[FloatArray, ...], zone: float, weight: FloatArray
 ) -> Iterator[FloatArray]:
     yield wanted
@@ -87,5 +91,9 @@ def _candidates(
         if square >= 0.0:
             yield wanted + cheap * (-along + math.sqrt(square))
             yield wanted + cheap * (-along - math.sqrt(square))
-    for steps in np.stack(np.meshgrid(_STEPS, _STEPS, _STEPS), axis=-1).reshape(-1, 3):
-        yield wanted + steps * zone
+
+
+def _around(wanted: FloatArray, zone: float) -> Iterator[FloatArray]:
+    """Where the zones around two vectors meet, farther away; some are beyond both."""
+    for steps in itertools.product(_STEPS, repeat=3):
+        yield wanted + np.array(steps) * zone

@@ -254,7 +254,7 @@ FLIGHT = Series(np.array([0.0, 10.0, 50.0]), np.array([0.0, 1.0, 0.0]))
 
 
 def in_force(parameters: ParameterHistory, time: float) -> Correction:
-    return PX4.in_force_at(parameters, 1, time, armed=FLIGHT).correction
+    return PX4.in_force_over(parameters, 1, [time], armed=FLIGHT)[0].correction
 
 
 @pytest.mark.parametrize(
@@ -395,3 +395,21 @@ def test_whole_numbers_are_written_as_such():
 def test_a_write_is_followed_by_a_restart():
     (warning,) = PX4.write_warnings({"CAL_MAG0_XCOMP": 1.0}, {"CAL_MAG_COMP_TYP": 2.0})
     assert "restart the vehicle" in warning
+
+
+def test_many_changes_take_no_longer_than_one_look_at_each():
+    sets = ((0.01 * n, {"CAL_MAG0_XOFF": 0.05 + 0.01 * (n % 3)}) for n in range(1, 4000))
+    parameters = history((0.0, held(1)), *sets)
+    times = [0.01 * n + 0.005 for n in range(4000)]
+    looks = 0
+
+    class Counted(ParameterHistory):
+        def of(self, name):
+            nonlocal looks
+            looks += 1
+            return super().of(name)
+
+    counted = Counted(parameters.changes, whole=True)
+    found = PX4.in_force_over(counted, 1, times, armed=FLIGHT)
+    assert len(found) == 4000
+    assert looks < 100
