@@ -214,12 +214,9 @@ class TestBoundedMemory:
         try:
             buffer = Buffer("x", limit=self.LIMIT)
             flight = Flight(buffer)
-            for index in range(12):
-                for number in range(100):
-                    line = f"text {index} {number}".encode()
-                    flight.say(mavlink.MAVLink_statustext_message(6, line), index * 11.0)
-                flight.step = index * 550
-                flight.fly(11)
+            for number in range(8000):
+                text = mavlink.MAVLink_statustext_message(6, f"text {number}".encode())
+                flight.say(text, number * 0.05)
             held, _ = tracemalloc.get_traced_memory()
         finally:
             tracemalloc.stop()
