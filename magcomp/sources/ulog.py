@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import calendar
+import math
 import re
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -84,7 +85,7 @@ def read_ulog(path: str | Path) -> Recording:
     last = max(int(topic.columns["timestamp"][-1]) for topic in log.topics.values())
     parameters = _parameters(log, zero)
     values = parameters.latest
-    version = firmware_version(int(log.info.get("ver_sw_release", 0)))
+    version = firmware_version(log.number("ver_sw_release"))
     quantities = Quantities(log, zero, version, values)
     armed = quantities.armed()
     compasses = Compasses(log, zero, parameters, armed).fields()
@@ -127,7 +128,7 @@ def _parameters(log: UlogFile, zero: int) -> ParameterHistory:
 
 
 def _vehicle(log: UlogFile, values: dict[str, float], version: str) -> Vehicle:
-    system, component, kind = (int(values.get(name, 0.0)) for name in _SYSTEM_NAMES)
+    system, component, kind = (_whole(values.get(name, 0.0)) for name in _SYSTEM_NAMES)
     status = log.topic("vehicle_status", "vehicle_type")
     if KINDS.get(kind, "unknown") == "unknown" and status is not None:
         rotary = bool(np.median(status.number("vehicle_type")) == _ROTARY)
@@ -146,6 +147,10 @@ def _vehicle(log: UlogFile, values: dict[str, float], version: str) -> Vehicle:
     )
 
 
+def _whole(value: float) -> int:
+    return int(value) if math.isfinite(value) else 0
+
+
 def _uid(text: str) -> str:
     try:
         return unique_id(bytes.fromhex(text), 0)
@@ -159,7 +164,14 @@ def _start(log: UlogFile, by_satellite: float, zero: int) -> float:
         return by_satellite
     for message in log.messages:
         if date := _NAMED_BY_DATE.search(message):
-            start = calendar.timegm(tuple(int(part) for part in date.groups()))
-            return float(start) if start > _EARLIEST_UNIX_S else float("nan")
-    booted = log.info.get("boot_time_utc_us", 0)
+            return _unix_s(*(int(part) for part in date.groups()))
+    booted = log.number("boot_time_utc_us")
     return (booted + zero) * MICROSECOND if booted else float("nan")
+
+
+def _unix_s(year: int, month: int, day: int, hour: int, minute: int, second: int) -> float:
+    try:
+        start = datetime(year, month, day, hour, minute, second, tzinfo=UTC).timestamp()
+    except ValueError:
+        return float("nan")
+    return start if start > _EARLIEST_UNIX_S else float("nan")

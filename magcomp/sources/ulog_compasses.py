@@ -116,7 +116,8 @@ class Compasses:
         for topic, value in tables:
             time = topic.measured(self.zero)
             sound = np.isfinite(value).all(axis=1) & (value != 0.0).any(axis=1)
-            devices = topic.columns.get("device_id", np.zeros(len(time)))
+            devices = topic.number("device_id") if "device_id" in topic else np.zeros(len(time))
+            sound &= np.isfinite(devices)
             for device in np.unique(devices[sound]).tolist():
                 mine = sound & (devices == device)
                 rows.setdefault(int(device), []).append((time[mine], value[mine]))
