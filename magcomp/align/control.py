@@ -38,7 +38,6 @@ _SMOOTHINGS = (0.03, 0.06, 0.1, 0.15, 0.2, 0.3)
 """Time constants in seconds by which a battery monitor may smooth."""
 _STEPS_SEEN = 1.5
 _CLEARLY_SMOOTHED = 0.9
-"""Time constants after which a smoothed quantity has forgotten."""
 _MOST_ROWS = 1_000_000
 """More rows in even steps than this mean that the times are not to be trusted."""
 

@@ -211,7 +211,15 @@ def _missing(recording: Recording, found: tuple[CompassContents, ...]) -> Iterat
         yield Missing("a firmware that can be served", str(error), prevents=True)
     how = {
         name: autopilot.how_to_record(name, recording.format)
-        for name in ("compass", "control", "current", "attitude", "parameters", "position")
+        for name in (
+            "compass",
+            "more readings",
+            "control",
+            "current",
+            "attitude",
+            "parameters",
+            "position",
+        )
     }
     if not found:
         yield Missing("readings of a compass", how["compass"], prevents=True)
@@ -219,9 +227,9 @@ def _missing(recording: Recording, found: tuple[CompassContents, ...]) -> Iterat
         yield Missing("a compass that can be fitted", found[0].left_out, prevents=True)
     elif all(compass.readings < LEAST_READINGS for compass in found):
         what = f"{LEAST_READINGS} new readings of a compass"
-        yield Missing(what, "record for longer, with the motors on", prevents=True)
+        yield Missing(what, how["more readings"], prevents=True)
     elif all(compass.rate_hz < SLOW_HZ for compass in found):
-        yield Missing("a reading of a compass each second", how["compass"], prevents=False)
+        yield Missing("a reading of a compass each second", how["more readings"], prevents=False)
     yield from _missing_controls(recording, how)
     if recording.attitude is None or len(recording.attitude) < 2:
         yield Missing("the attitude", how["attitude"], prevents=True)

@@ -318,6 +318,13 @@ class ArduPilot:
         """None: the messages say what they are."""
         return ()
 
+    def deaf_hint(self) -> str:
+        """SYSID_ENFORCE; since 4.7 a bit of MAV_OPTIONS, and the number is MAV_GCS_SYSID."""
+        return (
+            "with SYSID_ENFORCE on, it listens only to the ground station whose number is its "
+            "SYSID_MYGCS: give that number with --source-system"
+        )
+
     def no_compass_hint(self) -> str:
         """The switch of all compasses, and the message of the first."""
         return "is COMPASS_ENABLE 1, and does the link carry RAW_IMU?"

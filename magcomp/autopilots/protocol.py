@@ -425,6 +425,10 @@ class Autopilot(Protocol):
         """What a user must know of how the readings were understood, a sentence each."""
         ...
 
+    def deaf_hint(self) -> str:
+        """What to look for where a vehicle speaks but answers nothing; a clause."""
+        ...
+
     def no_compass_hint(self) -> str:
         """What to look for where no compass reports."""
         ...

@@ -297,6 +297,10 @@ class Px4:
             f"{named} by how well each calibration fits; {_OWN_LOG} to be sure",
         )
 
+    def deaf_hint(self) -> str:
+        """It takes every ground station; a link may carry one way only."""
+        return "does the link carry anything to the vehicle, or only from it?"
+
     def no_compass_hint(self) -> str:
         """Telemetry sends no compass by itself."""
         return "does the link carry SCALED_IMU?"

@@ -162,6 +162,7 @@ def calibrate(
         component=link.component,
         baud=link.baud,
         signing_key=link.key,
+        source_system=link.source_system,
         options=options,
     ) as session:
         session.manoeuvre = None if manoeuvre is None else Manoeuvre(manoeuvre)

@@ -72,6 +72,7 @@ def follow(address: str, link: LinkOptions, wanted: Following) -> ExitCode:
             component=link.component,
             baud=link.baud,
             signing_key=link.key,
+            source_system=link.source_system,
             refit_share=0.0,
         ) as session,
     ):

@@ -9,7 +9,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -18,7 +18,7 @@ import click
 from magcomp.cli.output import complain
 from magcomp.cli.vehicle import vehicle_options
 from magcomp.errors import UsageError
-from magcomp.link import read_signing_key
+from magcomp.link import GROUND_STATION_SYSTEM, read_signing_key
 
 _Result = TypeVar("_Result")
 
@@ -49,13 +49,16 @@ class LinkOptions:
         Signing key of 32 bytes, or None.
     timeout
         Seconds to wait for it.
+    source_system
+        The number that magcomp gives itself.
     """
 
     system: int | None
     component: int | None
     baud: int | None
-    key: bytes | None
+    key: bytes | None = field(repr=False)
     timeout: float
+    source_system: int = GROUND_STATION_SYSTEM
 
 
 def link_options(command: Callable[..., _Result]) -> Callable[..., _Result]:
@@ -90,12 +93,24 @@ def reach_options(command: Callable[..., _Result]) -> Callable[..., _Result]:
         metavar="S",
         help="How long to wait for the vehicle.",
     )
+    @click.option(
+        "--source-system",
+        type=click.IntRange(1, 255),
+        default=GROUND_STATION_SYSTEM,
+        show_default=True,
+        metavar="N",
+        help="MAVLink system of this ground station, where a vehicle listens to one only.",
+    )
     @functools.wraps(command)
     def with_reach(
-        baud: int | None, signing_key: Path | None, timeout: float, **others: object
+        baud: int | None,
+        signing_key: Path | None,
+        timeout: float,
+        source_system: int,
+        **others: object,
     ) -> _Result:
         key = None if signing_key is None else read_signing_key(signing_key)
-        return command(link=LinkOptions(None, None, baud, key, timeout), **others)
+        return command(link=LinkOptions(None, None, baud, key, timeout, source_system), **others)
 
     return with_reach
 

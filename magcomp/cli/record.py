@@ -59,6 +59,7 @@ def record(
             component=link.component,
             baud=link.baud,
             signing_key=link.key,
+            source_system=link.source_system,
             refit_share=0.0,
         ) as session,
     ):

@@ -128,6 +128,7 @@ class VehicleLink:
             system=link.system,
             component=link.component,
             key=link.key,
+            source_system=link.source_system,
             sinks=[latest],
         )
         with connection:

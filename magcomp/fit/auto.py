@@ -118,7 +118,7 @@ def require_readings(readings: Readings) -> None:
     if len(readings) < LEAST_READINGS:
         raise MissingDataError(
             f"Compass {readings.compass} must have at least {LEAST_READINGS} new readings; "
-            f"instead it has {len(readings)}: record for longer, with the motors on"
+            f"instead it has {len(readings)}"
         )
 
 

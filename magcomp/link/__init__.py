@@ -22,6 +22,7 @@ from magcomp.link.events import (
     VehicleFound,
     VehicleRebooted,
 )
+from magcomp.link.framing import GROUND_STATION_SYSTEM
 from magcomp.link.quality import Gap, LinkStatistics
 from magcomp.link.recorder import Recorder
 from magcomp.link.signing import read_signing_key
@@ -30,6 +31,7 @@ from magcomp.link.streams import DEFAULT_RATES, StreamReport
 
 __all__ = [
     "DEFAULT_RATES",
+    "GROUND_STATION_SYSTEM",
     "Address",
     "Connection",
     "FrameSink",

@@ -19,7 +19,7 @@ from magcomp.link.address import (
 from magcomp.link.clock import Clock, SystemClock
 from magcomp.link.diagnosis import why_no_vehicle
 from magcomp.link.events import LinkEvent
-from magcomp.link.framing import Message
+from magcomp.link.framing import GROUND_STATION_SYSTEM, Message
 from magcomp.link.opening import open_transport
 from magcomp.link.quality import LinkStatistics
 from magcomp.link.sinks import FrameSink, Sinks
@@ -55,6 +55,8 @@ class Connection:
         autopilots have.
     key
         Signing key of 32 bytes; None where the link is not signed.
+    source_system
+        The number this ground station gives itself.
     sinks
         Take every frame that arrives, whoever sent it.
 
@@ -72,6 +74,7 @@ class Connection:
         system: int | None = None,
         component: int | None = None,
         key: bytes | None = None,
+        source_system: int = GROUND_STATION_SYSTEM,
         sinks: Sequence[FrameSink] = (),
     ) -> None:
         self.address = address
@@ -81,7 +84,11 @@ class Connection:
         self._transport = opener()
         clock = self._transport.clock
         self._state = LinkState(
-            system=system, component=component, key=key, unix_us=clock.unix_us()
+            system=system,
+            component=component,
+            key=key,
+            unix_us=clock.unix_us(),
+            source_system=source_system,
         )
         self._inbox: deque[Message] = deque(maxlen=_INBOX)
         self._events: deque[LinkEvent] = deque(maxlen=_EVENTS)
@@ -229,6 +236,13 @@ class Connection:
             self._changed.wait_for(self._streams_idle, timeout)
             self._raise_failure()
             return self._state.stream_report or report
+
+    @property
+    def requested_rates(self) -> Mapping[str, float]:
+        """Message name to Hz, as asked for last; empty before that."""
+        with self._changed:
+            report = self._state.stream_report
+        return {} if report is None else report.requested
 
     # ---------------------------------------------------------------- how it goes
 
@@ -383,6 +397,7 @@ def connect(
     system: int | None = None,
     component: int | None = None,
     key: bytes | None = None,
+    source_system: int = GROUND_STATION_SYSTEM,
     sinks: Sequence[FrameSink] = (),
     clock: Clock | None = None,
 ) -> Connection:
@@ -399,6 +414,8 @@ def connect(
         autopilots have.
     key
         Signing key of 32 bytes, from ``read_signing_key``.
+    source_system
+        The number this ground station gives itself.
     sinks
         Recorders and buffers; the caller closes them.
     clock
@@ -421,5 +438,6 @@ def connect(
         system=system,
         component=component,
         key=key,
+        source_system=source_system,
         sinks=sinks,
     )

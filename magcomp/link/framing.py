@@ -98,17 +98,21 @@ class Framer:
         Signing key of 32 bytes; None leaves signatures unread and signs nothing.
     unix_us
         Calendar time, where the signature's time starts.
+    system
+        The ground station's own number.
     """
 
-    def __init__(self, key: bytes | None = None, unix_us: int = 0) -> None:
+    def __init__(
+        self, key: bytes | None = None, unix_us: int = 0, system: int = GROUND_STATION_SYSTEM
+    ) -> None:
         self.counts = FrameCounts()
         self._check = None if key is None else SignatureCheck(key, unix_us)
-        self._codec = mavlink.MAVLink(None, GROUND_STATION_SYSTEM, GROUND_STATION_COMPONENT)
+        self._codec = mavlink.MAVLink(None, system, GROUND_STATION_COMPONENT)
         self._halves: dict[Peer, _Half] = {}
         self._half = _Half()
         if key is not None:
             # Only for sending: the codec without a key decodes what the check has yet to judge.
-            self._signer = mavlink.MAVLink(None, GROUND_STATION_SYSTEM, GROUND_STATION_COMPONENT)
+            self._signer = mavlink.MAVLink(None, system, GROUND_STATION_COMPONENT)
             self._signer.signing.secret_key = key
             self._signer.signing.sign_outgoing = True
         else:

@@ -36,7 +36,7 @@ from magcomp.link.events import (
     VehicleFound,
     VehicleRebooted,
 )
-from magcomp.link.framing import Frame, Framer, Message
+from magcomp.link.framing import GROUND_STATION_SYSTEM, Frame, Framer, Message
 from magcomp.link.identity import Identification, read_heartbeat
 from magcomp.link.quality import Gap, LinkStatistics, RateMeter, SequenceCounter
 from magcomp.link.streams import StreamControl, StreamReport
@@ -81,6 +81,8 @@ class LinkState:
         Signing key, 32 bytes; None where frames are not signed.
     unix_us
         Calendar time of the start, for signatures.
+    source_system
+        The number this ground station gives itself.
     """
 
     def __init__(
@@ -90,8 +92,10 @@ class LinkState:
         component: int | None = None,
         key: bytes | None = None,
         unix_us: int = 0,
+        source_system: int = GROUND_STATION_SYSTEM,
     ) -> None:
-        self._framer = Framer(key, unix_us)
+        self._framer = Framer(key, unix_us, source_system)
+        self._source_system = source_system
         self._wanted_system = system
         self._wanted_component = component
         self._heartbeats: dict[tuple[int, int], Identity] = {}
@@ -228,7 +232,7 @@ class LinkState:
             A name magcomp does not stream, or a rate that is not above 0.
         """
         if self._vehicle is not None:
-            self._streams = self._streams or StreamControl(self._vehicle)
+            self._streams = self._streams or StreamControl(self._vehicle, self._source_system)
             self._streams.request(rates, self._meter.rates(now))
 
     def restore_streams(self) -> None:

@@ -130,10 +130,13 @@ class StreamControl:
     ----------
     to
         System and component of the vehicle.
+    source_system
+        The number this ground station gives itself.
     """
 
-    def __init__(self, to: tuple[int, int]) -> None:
+    def __init__(self, to: tuple[int, int], source_system: int = GROUND_STATION_SYSTEM) -> None:
         self._to = to
+        self._us = source_system
         self._wanted: dict[str, float] = {}
         self._how: dict[str, How] = {}
         self._previous_us: dict[str, int] = {}
@@ -209,7 +212,7 @@ class StreamControl:
         kind = message.get_type()
         if kind == "MESSAGE_INTERVAL":
             self._take_interval(message)
-        elif kind == "COMMAND_ACK" and _is_for_us(message):
+        elif kind == "COMMAND_ACK" and _is_for(self._us, message):
             self._take_ack(message)
 
     def due(self, now: float) -> list[Message]:
@@ -297,9 +300,9 @@ def _try_now(question: _Question, now: float) -> bool:
     return True
 
 
-def _is_for_us(message: Message) -> bool:
+def _is_for(us: int, message: Message) -> bool:
     """Tell whether an acknowledgement is ours; 0 is from firmware that does not say."""
-    return message.target_system in (0, GROUND_STATION_SYSTEM) and message.target_component in (
+    return message.target_system in (0, us) and message.target_component in (
         0,
         GROUND_STATION_COMPONENT,
     )

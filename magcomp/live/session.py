@@ -19,6 +19,7 @@ from magcomp.buffer import Buffer
 from magcomp.errors import LinkError, LinkTimeoutError, MagcompError
 from magcomp.link import (
     DEFAULT_RATES,
+    GROUND_STATION_SYSTEM,
     Connection,
     FrameSink,
     Recorder,
@@ -108,6 +109,7 @@ class LiveSession:
         component: int | None = None,
         baud: int | None = None,
         signing_key: bytes | None = None,
+        source_system: int = GROUND_STATION_SYSTEM,
         clock: Clock | None = None,
         rates: Mapping[str, float] = DEFAULT_RATES,
         options: Options | None = None,
@@ -123,7 +125,7 @@ class LiveSession:
             Write all that arrives into this .tlog.
         force
             Overwrite it.
-        system, component, baud, signing_key
+        system, component, baud, signing_key, source_system
             See ``magcomp.link.connect``; the key is 32 bytes from ``read_signing_key``.
         clock, rates, options, refit_share
             See the class.
@@ -147,6 +149,7 @@ class LiveSession:
                 system=system,
                 component=component,
                 key=signing_key,
+                source_system=source_system,
                 sinks=[tap],
                 clock=clock,
             )

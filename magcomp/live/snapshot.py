@@ -22,6 +22,9 @@ from magcomp.live.situation import Situation
 from magcomp.model import THROTTLE, Analysis, Grade, InForce, MotorFit, Vehicle
 
 _PLAUSIBLE = (150.0, 900.0)
+_RATES_SETTLED_S = 8.0
+_FAST_HZ = 5.0
+_SLOW_SHARE = 0.6
 """mGauss: the earth's field is 220 … 670; motors and a bad calibration add to it."""
 
 
@@ -236,6 +239,35 @@ def warnings(
         yield (
             f"a motor compensation by {regressor} is in force ({autopilot.switch} "
             f"{parameters[autopilot.switch]:g}): it is taken into account"
+        )
+
+
+def slow_streams(
+    asked: Mapping[str, float], received: Mapping[str, float], streaming_s: float
+) -> Iterator[str]:
+    """Say where the link brings much less than what was asked for, and what that costs.
+
+    Parameters
+    ----------
+    asked, received
+        Message name to Hz.
+    streaming_s
+        Seconds since the streams were asked for; rates are means over some seconds.
+    """
+    if streaming_s < _RATES_SETTLED_S:
+        return
+    slow = {
+        name: received[name] / rate
+        for name, rate in asked.items()
+        if received.get(name, 0.0) and rate >= _FAST_HZ and received[name] < _SLOW_SHARE * rate
+    }
+    if slow:
+        name = min(slow, key=lambda each: slow[each])
+        yield (
+            f"{name} comes {received[name]:.1f} times a second, though {asked[name]:.0f} were "
+            "asked for: what lies between (MAVProxy needs `set streamrate -1`; a slow radio) "
+            "limits it; fewer readings and coarser times make the answer less sure, so record "
+            "longer"
         )
 
 

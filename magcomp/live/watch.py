@@ -33,7 +33,7 @@ from magcomp.live.prepare import Preparation
 from magcomp.live.progress import Enough, HeadingRing, HoverBound
 from magcomp.live.refit import Refit
 from magcomp.live.situation import Look, Manoeuvre, SituationWatch
-from magcomp.live.snapshot import LiveSnapshot, compasses_now, warnings
+from magcomp.live.snapshot import LiveSnapshot, compasses_now, slow_streams, warnings
 from magcomp.live.tap import Tap
 from magcomp.model import CURRENT, THROTTLE, Analysis, Grade, Vehicle
 
@@ -75,6 +75,7 @@ class Watch:
         self._hover = HoverBound()
         self._enough = Enough()
         self._notes: list[str] = []
+        self._slow = ""
         self._gap = (-math.inf, "")
 
     @property
@@ -214,7 +215,15 @@ class Watch:
             return ()
         since = self._preparation.streaming_since
         streaming = 0.0 if since is None else self._clock.monotonic() - since
-        found = [*warnings(now, vehicle, parameters, streaming), *reversed(self._notes)]
+        asked, received = self._connection.requested_rates, self._connection.statistics().rates
+        slow = next(slow_streams(asked, received, streaming), "")
+        # The numbers it was first told with: a text that changes all the time is none.
+        self._slow = slow and (self._slow or slow)
+        found = [
+            *warnings(now, vehicle, parameters, streaming),
+            *filter(None, [self._slow]),
+            *reversed(self._notes),
+        ]
         ended, gap = self._gap
         if self._clock.monotonic() - ended < _GAP_TOLD_S:
             found.append(gap)

@@ -15,7 +15,7 @@ from textual.screen import Screen
 
 from magcomp.errors import MagcompError, UsageError
 from magcomp.model import Grade
-from magcomp.tui import fitting, opening, status, writing
+from magcomp.tui import fitting, opening, status, verifying, writing
 from magcomp.tui.base import BaseApp
 from magcomp.tui.help_text import help_text, key_lines
 from magcomp.tui.messages import (
@@ -106,6 +106,7 @@ class MagcompApp(BaseApp):
         if self.session is not None:
             self.live = message.snapshot
             opening.watch_vehicle(self)
+            verifying.watch_flight(self)
             self.redraw()
 
     def on_watching_failed(self, message: WatchingFailed) -> None:
@@ -153,6 +154,7 @@ class MagcompApp(BaseApp):
             "open_log": not work.source,
             "simulate": not work.source,
             "write": work.live,
+            "fly_again": self.simulation is not None and bool(self.writing.in_force),
             "undo": bool(self.writing.in_force),
         }
         return shown.get(action, True)
@@ -186,6 +188,11 @@ class MagcompApp(BaseApp):
     def action_report(self) -> None:
         """Save a report."""
         writing.ask_report(self)
+
+    def action_fly_again(self) -> None:
+        """Let the simulated vehicle fly with what was written."""
+        if self.simulation is not None:
+            self.simulation.fly_again()
 
     def action_undo(self) -> None:
         """Bring the vehicle back to what it held."""

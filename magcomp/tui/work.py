@@ -10,6 +10,7 @@ from magcomp.analysis import Options, parameter_set
 from magcomp.model import Analysis, Grade, ParameterSet, Recording
 from magcomp.tui.changes import ChangeRow
 from magcomp.tui.pictures import CompassPicture
+from magcomp.tui.promise import Promise
 from magcomp.tui.vehicle_card import VehicleCard
 
 
@@ -102,6 +103,12 @@ class Writing:
     before, in_force
         What the vehicle held before it was written, and what it holds since; empty where it was
         not written.
+    promised, since_s
+        The fit that was written, and the second of the recording since when it is in force.
+    flying
+        The motors have run since, and still do.
+    measured, measured_trouble
+        What the flights since showed, or why nothing.
     """
 
     rows: tuple[ChangeRow, ...] = ()
@@ -110,3 +117,8 @@ class Writing:
     result: str = ""
     before: Mapping[str, float] = field(default_factory=dict)
     in_force: Mapping[str, float] = field(default_factory=dict)
+    promised: Analysis | None = None
+    since_s: float = 0.0
+    flying: bool = False
+    measured: tuple[Promise, ...] = ()
+    measured_trouble: str = ""

@@ -184,7 +184,11 @@ def format_parameters(parameters: ParameterSet, suffix: str) -> str:
 
 
 def write_parameter_file(
-    path: str | Path, parameters: ParameterSet, *, force: bool = False
+    path: str | Path,
+    parameters: ParameterSet,
+    *,
+    force: bool = False,
+    only_mine: bool = False,
 ) -> None:
     """Write a parameter file: all of it, or nothing.
 
@@ -199,6 +203,8 @@ def write_parameter_file(
         What to write.
     force
         Replace a file that is already there.
+    only_mine
+        Let nobody else read it, as backups of a vehicle.
 
     Raises
     ------
@@ -216,16 +222,21 @@ def write_parameter_file(
             raise OutputError(f"{path} must be a file; instead it is a directory")
         if path.exists() and not force:
             raise OutputError(f"{path} must not exist yet; use --force to overwrite it")
-        _replace(path, content)
+        _replace(path, content, private if only_mine else None)
     except OSError as error:
         raise OutputError(f"{path} must be writable; instead received: {error.strerror}") from error
 
 
-def _replace(path: Path, content: bytes) -> None:
+def private(path: str, flags: int) -> int:
+    """Open a file so that only its owner may read it; an opener for ``open``."""
+    return os.open(path, flags, 0o600)
+
+
+def _replace(path: Path, content: bytes, opener: Callable[[str, int], int] | None) -> None:
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
     temporary.unlink(missing_ok=True)
     try:
-        with temporary.open("xb") as file:
+        with open(temporary, "xb", opener=opener) as file:
             file.write(content)
             file.flush()
             os.fsync(file.fileno())

@@ -20,7 +20,7 @@ from typing import Any, TextIO
 
 from magcomp.errors import OutputError, ParameterFileError
 from magcomp.writing.events import Event, Intends, Outcome, Progress, Reason, Stage, Standing
-from magcomp.writing.files import sync_directory
+from magcomp.writing.files import private, sync_directory
 from magcomp.writing.owner import document
 from magcomp.writing.plan import WritePlan
 
@@ -79,7 +79,9 @@ class Journal:
     def __init__(self, backup: Path, plan: WritePlan) -> None:
         self.path = journal_path(backup)
         try:
-            self._file: TextIO = self.path.open("x", encoding="utf-8")
+            self._file: TextIO = open(  # noqa: SIM115 - closed by __exit__
+                self.path, "x", encoding="utf-8", opener=private
+            )
         except OSError as error:
             raise _refused(self.path, error) from error
         begin = {

@@ -45,6 +45,8 @@ from magcomp.writing.messages import (
 )
 
 _LIST_ATTEMPTS = 25
+_DEAF_ATTEMPTS = 12
+"""So often the first of many names are asked for before a vehicle counts as deaf."""
 
 
 class ReaderState(Enum):
@@ -113,6 +115,11 @@ class ParameterReader:
     def values(self) -> Mapping[str, float]:
         """What has been read so far, by name."""
         return dict(self._values)
+
+    @property
+    def answered(self) -> bool:
+        """Whether the vehicle has answered anything that it was asked."""
+        return bool(self._values or self._missing)
 
     @property
     def missing(self) -> tuple[str, ...]:
@@ -226,17 +233,22 @@ class ParameterReader:
         if not self._names.open:
             self.state = ReaderState.DONE
             return []
-        if self._values or self._missing:
+        if self.answered:
             silent = self._names.unanswered(now, self._names.telling_attempts)
             # Only when nothing else is left to learn how lossy the link is.
             if len(silent) == len(self._names.open):
                 self._missing.extend(silent)
                 self.state = ReaderState.DONE
                 return []
-        elif self._names.unanswered(now):
+        elif self._is_deaf(now) or self._names.unanswered(now):
             self.abandon("the vehicle answers no parameter request")
             return []
         return [ReadName(name) for name, _ in self._names.ask(now)]
+
+    def _is_deaf(self, now: float) -> bool:
+        """Whether the vehicle speaks, but has long answered nothing."""
+        speaks = now - self._heard < self._timing.quiet
+        return speaks and bool(self._names.unanswered(now, _DEAF_ATTEMPTS))
 
     def _progress(self) -> list[ReadProgress]:
         if self.state is ReaderState.NAMING or self._names.total:

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
+from magcomp import autopilots
 from magcomp.errors import (
     LinkError,
     LinkTimeoutError,
@@ -168,8 +169,9 @@ def fetch(
 
     run(reader, connection, Peer.of(vehicle), clock=clock, on_events=tell)
     if reader.failure:
+        hint = "" if reader.answered else f" ({autopilots.of(vehicle).deaf_hint()})"
         raise LinkTimeoutError(
-            f"system {vehicle.system} must send its parameters; instead {reader.failure}"
+            f"system {vehicle.system} must send its parameters; instead {reader.failure}{hint}"
         )
     return reader.values
 
@@ -236,7 +238,7 @@ def write(
     """
     if not plan.changes:
         return Outcome(Standing.NEW)
-    write_parameter_file(backup, plan.backup)
+    write_parameter_file(backup, plan.backup, only_mine=True)
     with Journal(backup, plan) as journal:
         return _Drive(plan, connection, journal, clock, on_event, stop, timing).run()
 

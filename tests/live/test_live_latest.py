@@ -9,6 +9,7 @@ from link_vehicle import UNIX_US, FakeVehicle
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from magcomp.live.latest import Latest
+from magcomp.live.snapshot import slow_streams
 from magcomp.model import Vehicle
 
 VEHICLE = Vehicle("ardupilot", "copter", 1, 1)
@@ -50,3 +51,20 @@ def test_parameters_are_read_as_the_vehicle_sends_them(
     vehicle = Vehicle(autopilot, "copter", 1, 1, capabilities=capabilities)
     assert latest.parameters(vehicle) == {"CAL_MAG0_ID": pytest.approx(value, abs=1e-9)}
     assert latest.parameters(Vehicle(autopilot, "copter", 2, 1)) == {}
+
+
+def test_a_link_that_brings_less_than_asked_for_is_told_with_what_it_costs():
+    asked = {"RAW_IMU": 50.0, "ATTITUDE": 50.0, "SYS_STATUS": 2.0}
+    slow = {"RAW_IMU": 8.7, "ATTITUDE": 12.0, "SYS_STATUS": 0.5}
+    (told,) = slow_streams(asked, slow, 20.0)
+    assert told.startswith("RAW_IMU comes 8.7 times a second, though 50 were asked for")
+    assert "record longer" in told
+    assert list(slow_streams(asked, slow, 2.0)) == []
+    assert list(slow_streams(asked, {**slow, "RAW_IMU": 45.0, "ATTITUDE": 40.0}, 20.0)) == []
+
+
+def test_the_accelerometer_is_read_in_metres_per_second_squared():
+    latest = Latest()
+    raw = mavlink.MAVLink_raw_imu_message(0, 100, -200, -1000, 0, 0, 0, 1, 2, 3)
+    latest.add(1, bytes(raw.pack(mavlink.MAVLink(None, 1, 1))))
+    assert latest.now(VEHICLE).accel == pytest.approx((0.980665, -1.96133, -9.80665))

@@ -15,6 +15,7 @@ from magcomp.live.situation import Situation
 from magcomp.model import Grade
 from magcomp.tui import MagcompApp, writing
 from magcomp.tui.changes import READ_BACK
+from magcomp.tui.promise import Promise
 from magcomp.tui.screens.dialogs import Confirm, Message
 from magcomp.tui.status import STEPS
 from magcomp.tui.work import Work
@@ -135,6 +136,22 @@ async def verify_moved(pilot: Any) -> None:
     await until(pilot, lambda: app.live is app.session.shown)
 
 
+async def verify_measured(pilot: Any) -> None:
+    await _live(pilot, "verify", made.work(live=True), armed=False, situation=Situation.FLYING)
+    app = pilot.app
+    held = made.parameters()
+    app.writing = replace(
+        app.writing,
+        before=held,
+        in_force=held,
+        measured=tuple(
+            Promise(compass, 24.0, "current", 0.4, measured, 0.1)
+            for compass, measured in ((1, 0.3), (2, 0.45), (3, 1.2))
+        ),
+    )
+    app.redraw()
+
+
 async def trouble(pilot: Any) -> None:
     await fit_heading(pilot)
     message = Message(
@@ -178,6 +195,7 @@ STAGES: tuple[Stage, ...] = (
     review_written,
     verify,
     verify_moved,
+    verify_measured,
     trouble,
     help_for_fit,
 )

@@ -133,7 +133,10 @@ def test_a_vehicle_without_parameters_is_one_sentence() -> None:
     autopilot.answer = lambda *_: []
     with pytest.raises(LinkTimeoutError, match="does not send its parameter list"):
         fetch(link, QUAD, clock=clock)
-    with pytest.raises(LinkTimeoutError, match="answers no parameter request"):
+    with pytest.raises(
+        LinkTimeoutError,
+        match=r"answers no parameter request \(with SYSID_ENFORCE on.*--source-system",
+    ):
         fetch(link, QUAD, ["COMPASS_MOTCT"], clock=clock)
 
 

@@ -1,0 +1,90 @@
+"""Commands that write: the right vehicle only, whoever else is on the link, and words to paste."""
+
+from __future__ import annotations
+
+import io
+import shlex
+import stat
+
+import pytest
+from live_vehicle import COMPENSATION, alive, held, landed
+
+from magcomp.cli.app import run
+from magcomp.errors import ExitCode
+from magcomp.model import ParameterSet
+from magcomp.simulate import CAMERA, COMPUTER, GIMBAL, Habits
+from magcomp.simulate.habits import own_number
+from magcomp.writing.files import read_parameter_file, write_parameter_file
+from magcomp.writing.journal import journal_path
+
+
+@pytest.fixture(autouse=True)
+def _data_directory(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
+
+
+@pytest.fixture(scope="module")
+def upload(tmp_path_factory):
+    """What the vehicle of seed 4 held, in a file that says whose it is; and what was said."""
+    folder = tmp_path_factory.mktemp("with space")
+    path, wanted = folder / "backup.param", folder / "wanted.param"
+    write_parameter_file(wanted, ParameterSet(COMPENSATION))
+    with alive(vehicle=landed(seed=4)) as flown, pytest.MonkeyPatch.context() as patch:
+        said = io.StringIO()
+        patch.setattr("sys.stderr", said)
+        arguments = ["--yes", "--any-vehicle", "--backup", str(path)]
+        assert run(["upload", str(wanted), flown.address, *arguments]) == ExitCode.GOOD
+    return path, said.getvalue()
+
+
+@pytest.fixture
+def backup(upload):
+    return upload[0]
+
+
+def test_a_backup_belongs_to_one_flight_controller_and_its_twin_is_refused(backup, capsys):
+    assert read_parameter_file(backup).vehicle.uid == own_number(4).hex()
+    for name in (backup, journal_path(backup)):
+        assert stat.S_IMODE(name.stat().st_mode) == 0o600
+    twin = landed(seed=4, habits=Habits(uid=own_number(5)))
+    before = held(twin)
+    capsys.readouterr()
+    with alive(vehicle=twin) as flown:
+        assert run(["restore", str(backup), flown.address, "--yes"]) == ExitCode.LINK
+    assert held(twin) == before
+    said = capsys.readouterr().err
+    assert own_number(4).hex() in said
+    assert own_number(5).hex() in said
+
+
+def test_the_command_that_undoes_stands_on_a_line_of_its_own_and_works(upload):
+    backup, said = upload
+    (line,) = [line for line in said.splitlines() if line.startswith("  magcomp restore")]
+    words = shlex.split(line)
+    assert words[:3] == ["magcomp", "restore", str(backup)]
+    vehicle = landed(seed=4)
+    with alive(vehicle=vehicle, port=int(words[3].rpartition(":")[2])):
+        assert run([*words[1:], "--yes"]) == ExitCode.GOOD
+
+
+def test_gimbal_camera_and_companion_are_never_the_vehicle(backup):
+    vehicle = landed(seed=4, habits=Habits(companions=(GIMBAL, CAMERA, COMPUTER)))
+    with alive(vehicle=vehicle) as flown:
+        for choice in ([], ["--system", "1"]):
+            code = run(["restore", str(backup), flown.address, "--yes", *choice])
+            assert code == ExitCode.GOOD
+    assert held(vehicle)["COMPASS_MOTCT"] == read_parameter_file(backup).values["COMPASS_MOTCT"]
+
+
+@pytest.mark.slow
+def test_a_vehicle_that_listens_to_one_ground_station_says_how_to_be_that_one(backup, capsys):
+    strict = {"SYSID_ENFORCE": 1.0, "SYSID_MYGCS": 200.0}
+    vehicle = landed(seed=4, parameters=strict)
+    before = held(vehicle)
+    with alive(vehicle=vehicle) as flown:
+        assert run(["restore", str(backup), flown.address, "--yes"]) == ExitCode.TIMEOUT
+        said = capsys.readouterr().err
+        assert "SYSID_MYGCS: give that number with --source-system" in said
+        assert held(vehicle) == before
+        arguments = ["--yes", "--source-system", "200"]
+        assert run(["restore", str(backup), flown.address, *arguments]) == ExitCode.GOOD
