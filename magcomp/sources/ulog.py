@@ -23,6 +23,7 @@ _MAGIC = b"ULog\x01\x12\x35"
 _AUTOPILOT = "px4"
 _SYSTEM_NAMES = ("MAV_SYS_ID", "MAV_COMP_ID", "MAV_TYPE")
 _ROTARY = 1
+_ATTITUDE = "vehicle_attitude"
 
 _TOPICS = (
     "actuator_armed",
@@ -30,12 +31,13 @@ _TOPICS = (
     "actuator_motors",
     "actuator_outputs",
     "battery_status",
+    "esc_status",
     "sensor_combined",
     "sensor_gps",
     "sensor_mag",
     "vehicle_acceleration",
     "vehicle_angular_velocity",
-    "vehicle_attitude",
+    _ATTITUDE,
     "vehicle_global_position",
     "vehicle_gps_position",
     "vehicle_magnetometer",
@@ -91,6 +93,7 @@ def read_ulog(path: str | Path) -> Recording:
     compasses = Compasses(log, zero, parameters, armed).fields()
     batteries = quantities.currents()
     battery = quantities.battery(batteries)
+    attitude = quantities.attitude()
     return Recording(
         source=str(path),
         vehicle=_vehicle(log, values, version),
@@ -101,7 +104,8 @@ def read_ulog(path: str | Path) -> Recording:
         report=ReadReport(
             size=len(octets), frames=sum(map(len, log.topics.values())), used=quantities.rows()
         ),
-        attitude=quantities.attitude(),
+        attitude=attitude,
+        attitude_source="" if attitude is None else _ATTITUDE,
         gyro=quantities.gyro(),
         accel=quantities.accel(),
         throttle=quantities.throttle(),
@@ -112,6 +116,7 @@ def read_ulog(path: str | Path) -> Recording:
         armed=armed,
         format="ulog",
         battery=battery,
+        esc_current=quantities.esc_current(),
         other_currents={n: each for n, each in batteries.items() if n != battery},
         raw_compasses=frozenset(n for n, each in compasses.items() if each.raw),
     )

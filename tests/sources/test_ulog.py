@@ -143,6 +143,15 @@ def test_a_battery_without_a_current_sensor_has_no_current(recorded, absent: flo
     assert found.voltage is not None
 
 
+def test_the_speed_controllers_currents_are_summed(recorded) -> None:
+    writer = short_flight(1)
+    for n in range(5):
+        writer.row("esc_status", n / 10, 0, 3.0 + n, 0, 4.0)
+    found = recorded(writer)
+    assert found.esc_current.value.tolist() == [7.0, 8.0, 9.0, 10.0, 11.0]
+    assert found.attitude_source == "vehicle_attitude"
+
+
 def batteries(switch: int) -> Writer:
     writer = Writer(parameters={"CAL_MAG_COMP_TYP": switch})
     for n in range(20):
