@@ -170,7 +170,7 @@ class WriteSequence:
         elif isinstance(message, ParamValue):
             self._take_value(message, now)
         elif isinstance(message, ParamRefused) and self._exchange.differ(message.name):
-            self._fail(Reason.REFUSED, f"{message.name} was not taken: {message.reason}", now)
+            self._take_refusal(message, now)
         elif isinstance(message, OwnNumber):
             self._take_own_number(message.uid)
 
@@ -235,6 +235,15 @@ class WriteSequence:
             del self._unconfirmed[name]
         done, total = self._exchange.answered, self._exchange.total
         self._events.append(Progress(self.stage, name, done, total))
+
+    def _take_refusal(self, message: ParamRefused, now: float) -> None:
+        name = message.name
+        if self._rolling_back is not None and name in self._unconfirmed:
+            # What takes no write still holds its old value: VERIFY will tell.
+            del self._unconfirmed[name]
+            self._exchange.answer(name)
+            return
+        self._fail(Reason.REFUSED, f"{name} was not taken: {message.reason}", now)
 
     def _take_own_number(self, uid: str) -> None:
         wanted = self._plan.vehicle.uid
