@@ -89,7 +89,7 @@ BAD: list[tuple[Callable[[Path], None], str]] = [
     (no_attitude, "attitude"),
     (nan_parameters, "COMPASS_OFS_X must be a finite number"),
     (two_vehicles, "--system"),
-    (px4, "ArduPilot"),
+    (px4, "must tell the vehicle's CAL_MAG_COMP_TYP"),
 ]
 
 
