@@ -148,6 +148,7 @@ class MagcompApp(BaseApp):
         rejected = work.analysis is not None and work.analysis.grade is Grade.REJECTED
         shown = {
             "forward": bool(work.source and following) and not (following == "review" and rejected),
+            "other_fit": len(work.tried) > 1,
             "report": work.analysis is not None,
             "backward": self.current_mode != road[0],
             "disconnect": bool(work.source),
@@ -176,6 +177,10 @@ class MagcompApp(BaseApp):
     def action_fit(self) -> None:
         """Fit what is recorded so far."""
         fitting.again(self)
+
+    def action_other_fit(self) -> None:
+        """Show another one of the fits tried."""
+        fitting.show_other(self)
 
     def action_write(self) -> None:
         """Write to the vehicle."""

@@ -11,6 +11,7 @@ import made
 import scripted
 from scripted import ScriptedSession, until
 
+from magcomp.analysis import Options
 from magcomp.live.situation import Situation
 from magcomp.model import Grade
 from magcomp.tui import MagcompApp, writing
@@ -84,6 +85,17 @@ async def fit_unexplained(pilot: Any) -> None:
 async def fit_verdict(pilot: Any) -> None:
     await _log(pilot, "fit", Grade.GOOD, Grade.MARGINAL, Grade.REJECTED)
     await pilot.press("v", "v", "v", "2")
+
+
+async def fit_fits(pilot: Any) -> None:
+    await _log(pilot, "fit", Grade.GOOD, Grade.GOOD)
+    app = pilot.app
+    for method, grade in (("levels", Grade.MARGINAL), ("sweep", Grade.REJECTED)):
+        other = made.analysis(grade, Grade.GOOD)
+        work = replace(app.work, options=Options(method=method))
+        app.set_work(work.with_analysis(other, made.pictures(other)))
+    app.action_other_fit()
+    await pilot.press("v", "v", "v", "v")
 
 
 async def review_log(pilot: Any) -> None:
@@ -188,6 +200,7 @@ STAGES: tuple[Stage, ...] = (
     fit_shift,
     fit_unexplained,
     fit_verdict,
+    fit_fits,
     fit_in_sunlight,
     review_log,
     review,
