@@ -97,17 +97,29 @@ def held(vehicle: Vehicle) -> Held:
     return {name: vehicle.parameters[name] for name in (*NAMES, SWITCH)}
 
 
-def parked() -> Vehicle:
+def parked(habits: Habits, *, answers_errors: bool = False) -> Vehicle:
     return Vehicle(
-        scenario("parked", SEED, compensation="wrong"), habits=Habits(storage_s=STORAGE_S)
+        scenario("parked", SEED, compensation="wrong"),
+        habits=habits,
+        answers_errors=answers_errors,
     )
 
 
 class Case:
     """One write with one fault at one message, and what came of it."""
 
-    def __init__(self, faults: Faults, folder: Path, at: int = 0, kind: str = "") -> None:
-        self.vehicle = parked()
+    def __init__(
+        self,
+        faults: Faults,
+        folder: Path,
+        at: int = 0,
+        kind: str = "",
+        *,
+        habits: Habits | None = None,
+        answers_errors: bool = False,
+        seed: int = 0,
+    ) -> None:
+        self.vehicle = parked(habits or Habits(storage_s=STORAGE_S), answers_errors=answers_errors)
         self.old = held(self.vehicle)
         self.new = {n: as_float32(self.old[n] + 0.0625) for n in NAMES} | {SWITCH: 1.0}
         self.backup = folder / "backup.param"
@@ -117,7 +129,7 @@ class Case:
         wanted = ParameterSet(self.new, IDENTITY)
         current = writer.read_current(calm, IDENTITY, wanted, clock=calm.clock)
         self.plan = plan(current, wanted, IDENTITY)
-        link = FaultyLink(self.vehicle, faults)
+        link = FaultyLink(self.vehicle, faults, seed)
         self.watched = Watched(link, self.vehicle)
         connection = LocalConnection(self.watched, calm.clock())
         messages = _Counter(connection, at if kind == "killed" else 0)

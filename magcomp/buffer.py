@@ -7,7 +7,8 @@ code that reads a log, and gives the same numbers. Over its bound:
    the next, and again, until none is above 20 Hz. Compasses are read at 10 Hz: what goes
    are mostly repeats.
 2. After that the oldest blocks go. The vehicle's parameters and identity stay; only reports that
-   repeat the value before them go.
+   repeat the value before them go. Of what it says in words the beginning stays, where the
+   firmware is named.
 3. Where those alone are more than a quarter of the bound, as no sound vehicle's are, the oldest go.
 """
 
@@ -46,6 +47,8 @@ _FASTEST_HZ = 20.0
 _KEPT_SHARE = 4
 _MOST_BLOCKS = 2048
 _MOST_SENDERS = 32
+_MOST_TEXTS = 64
+_ENTRY_SIZE = 500  # what Python needs to keep one record apart from its bytes
 _PINNED = frozenset({Message.PARAM_VALUE, Message.AUTOPILOT_VERSION, Message.STATUSTEXT})
 _TYPICAL_DIP = math.radians(60.0)
 
@@ -95,6 +98,11 @@ class _Kept(NamedTuple):
     value: bytes
     record: bytes
 
+    @property
+    def size(self) -> int:
+        """Bytes of memory it takes, about."""
+        return _ENTRY_SIZE + len(self.key[1]) + len(self.value) + len(self.record)
+
 
 class Buffer:
     """The recording so far of a live link. One thread may add while another takes snapshots.
@@ -120,6 +128,7 @@ class Buffer:
         self._kept: deque[_Kept] = deque()
         self._kept_size = 0
         self._kept_last: dict[_Key, _Kept] = {}
+        self._texts = 0
         self._lock = threading.Lock()
         self._field = (math.cos(dip_rad), math.sin(dip_rad))
         self._levels: dict[tuple[int, int], int] = {}
@@ -269,6 +278,10 @@ class Buffer:
             stream = _stream(frame)
             if stream[2] not in _PINNED:
                 continue
+            if stream[2] == Message.STATUSTEXT:
+                self._texts += 1
+                if self._texts > _MOST_TEXTS:
+                    continue
             content, value = payload(frame), b""
             if stream[2] == Message.PARAM_VALUE:
                 content, value = name_and_field(content)
@@ -280,10 +293,10 @@ class Buffer:
             return
         self._kept.append(entry)
         self._kept_last[entry.key] = entry
-        self._kept_size += len(entry.record)
+        self._kept_size += entry.size
         while self._kept_size > self._limit // _KEPT_SHARE:
             oldest = self._kept.popleft()
-            self._kept_size -= len(oldest.record)
+            self._kept_size -= oldest.size
             if self._kept_last[oldest.key] is oldest:
                 del self._kept_last[oldest.key]
 

@@ -43,6 +43,7 @@ def _document(recording: Recording, found: Contents) -> dict[str, Any]:
         "format": recording.format,
         "start_unix_s": recording.start_unix_s,
         "board": recording.vehicle.board,
+        "frame": recording.vehicle.frame,
         "compasses": [_compass(each) for each in found.compasses],
         "quantities": [asdict(each) for each in found.quantities],
         "armed_s": found.armed_s,
@@ -79,8 +80,8 @@ def _compass(of: CompassContents) -> dict[str, Any]:
 def _lines(recording: Recording, found: Contents, columns: int) -> Iterator[str]:
     vehicle = recording.vehicle
     yield f" {words.printable(recording.source)}"
-    board = f", {vehicle.board}" if vehicle.board else ""
-    yield f" {words.duration(recording.duration_s)} of {words.vehicle(vehicle)}{board}"
+    of_it = [words.vehicle(vehicle), vehicle.board, vehicle.frame and f"frame {vehicle.frame}"]
+    yield f" {words.duration(recording.duration_s)} of {', '.join(filter(None, of_it))}"
     yield f" {_began(recording.start_unix_s)}, {_parameters(recording, found)}"
     if recording.report.skipped:
         yield f" {recording.report.skipped} bytes of {recording.report.size} belong to no message"

@@ -18,7 +18,7 @@ import click
 from magcomp.cli.output import complain
 from magcomp.cli.vehicle import vehicle_options
 from magcomp.errors import UsageError
-from magcomp.link import GROUND_STATION_SYSTEM, read_signing_key
+from magcomp.link import GROUND_STATION_SYSTEM, is_read_by_others, read_signing_key
 
 _Result = TypeVar("_Result")
 
@@ -110,6 +110,8 @@ def reach_options(command: Callable[..., _Result]) -> Callable[..., _Result]:
         **others: object,
     ) -> _Result:
         key = None if signing_key is None else read_signing_key(signing_key)
+        if signing_key is not None and is_read_by_others(signing_key):
+            complain(f"{signing_key} can be read by others on this computer: chmod 600 keeps it")
         return command(link=LinkOptions(None, None, baud, key, timeout, source_system), **others)
 
     return with_reach

@@ -20,7 +20,13 @@ from magcomp.cli.linking import (
     yes_option,
 )
 from magcomp.cli.output import complain
-from magcomp.cli.writing import agreed, carry_out, need_consent, show_difference
+from magcomp.cli.writing import (
+    agreed,
+    carry_out,
+    need_consent,
+    say_what_is_held,
+    show_difference,
+)
 from magcomp.errors import ExitCode, UsageError
 from magcomp.link import Connection, Replay, connect
 from magcomp.live.latest import Latest
@@ -157,9 +163,11 @@ class VehicleLink:
         show_difference(plan)
         if not plan.changes:
             complain(nothing or "The vehicle holds all of this already; nothing is written")
+            say_what_is_held(plan, after=False)
             return ExitCode.GOOD, plan
         if writing.dry_run:
             complain("Nothing is written because of --dry-run")
+            say_what_is_held(plan, after=False)
             return ExitCode.GOOD, plan
         self._wait_disarmed(writing.wait)
         if not agreed(len(plan.changes), yes=writing.yes):

@@ -24,6 +24,7 @@ from magcomp.writing.events import (
     Stage,
 )
 from magcomp.writing.files import format_value
+from magcomp.writing.holding import holding
 from magcomp.writing.plan import WritePlan
 from magcomp.writing.writer import raise_for_failure
 
@@ -80,6 +81,12 @@ def show_difference(plan: WritePlan, *, to_stderr: bool = False) -> None:
         complain(warning)
 
 
+def say_what_is_held(plan: WritePlan, *, after: bool) -> None:
+    """Say in a line what the vehicle holds, before or after a write."""
+    values = {**plan.old, **plan.new, **plan.switches} if after else plan.old
+    complain(f"The vehicle holds: {holding(plan.vehicle, values)}")
+
+
 def agreed(count: int, *, yes: bool) -> bool:
     """Ask for consent, where it was not given beforehand."""
     if yes:
@@ -124,6 +131,7 @@ def carry_out(
         return ExitCode.INTERRUPTED
     raise_for_failure(outcome, backup, address)
     complain(f"Written and read back: {len(plan.changes)} parameters")
+    say_what_is_held(plan, after=True)
     return ExitCode.GOOD
 
 

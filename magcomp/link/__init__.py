@@ -25,7 +25,7 @@ from magcomp.link.events import (
 from magcomp.link.framing import GROUND_STATION_SYSTEM
 from magcomp.link.quality import Gap, LinkStatistics
 from magcomp.link.recorder import Recorder
-from magcomp.link.signing import read_signing_key
+from magcomp.link.signing import is_read_by_others, read_signing_key
 from magcomp.link.sinks import FrameSink
 from magcomp.link.streams import DEFAULT_RATES, StreamReport
 
@@ -54,6 +54,7 @@ __all__ = [
     "VehicleFound",
     "VehicleRebooted",
     "connect",
+    "is_read_by_others",
     "parse_address",
     "read_signing_key",
     "serial_ports",

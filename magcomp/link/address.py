@@ -2,9 +2,10 @@
 
 ====================  ==============================================================
 udp:HOST:PORT         listen on HOST:PORT and answer whoever speaks (same as udpin:)
+udp:PORT              the same for this computer only; 0.0.0.0 as HOST for the network
 udpout:HOST:PORT      speak first to HOST:PORT
 tcp:HOST:PORT         connect to HOST:PORT
-tcpin:HOST:PORT       listen on HOST:PORT for one connection
+tcpin:HOST:PORT       listen on HOST:PORT for one connection; tcpin:PORT as with udp:
 /dev/ttyACM0[,BAUD]   serial port, 115200 baud unless said otherwise
 COM7[,BAUD]           the same on Windows
 FLIGHT.tlog[,10x]     replay of a recorded log, at real time or faster
@@ -115,6 +116,11 @@ _NETWORK: dict[str, type[UdpServer | UdpClient | TcpClient | TcpServer]] = {
 }
 
 
+_LISTENING = (UdpServer, TcpServer)
+LOOPBACK = "127.0.0.1"
+"""Where a listening address without a host is: nobody elsewhere may speak to it unasked."""
+
+
 @dataclass(frozen=True)
 class SerialPort:
     """A serial port of this computer and what is plugged into it."""
@@ -144,7 +150,10 @@ def parse_address(text: str, *, baud: int | None = None, speed: float | None = N
     scheme, colon, rest = text.partition(":")
     if colon and scheme.lower() in _NETWORK:
         _refuse_baud(text, baud)
-        return _NETWORK[scheme.lower()](*_host_and_port(rest, text))
+        kind = _NETWORK[scheme.lower()]
+        if kind in _LISTENING and _digits(rest.removeprefix(":")):
+            rest = f"{LOOPBACK}:{rest.removeprefix(':')}"
+        return kind(*_host_and_port(rest, text))
     name, comma, option = text.rpartition(",")
     if not comma:
         name, option = text, ""

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import hashlib
 import hmac
+import os
+import stat
 from pathlib import Path
 
 from magcomp.errors import InputError
@@ -53,6 +55,14 @@ def read_signing_key(path: Path) -> bytes:
             f"instead received {'nothing' if not passphrase else 'more than 4096 bytes'}."
         )
     return hashlib.sha256(passphrase.encode()).digest()
+
+
+def is_read_by_others(path: Path) -> bool:
+    """Whether other users of this computer may read a file, where the system tells."""
+    try:
+        return os.name != "nt" and bool(path.stat().st_mode & (stat.S_IRGRP | stat.S_IROTH))
+    except OSError:
+        return False
 
 
 def signing_timestamp(unix_us: int) -> int:

@@ -23,6 +23,7 @@ Rules
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -58,6 +59,7 @@ _CLOCK_BACK_MS = 2000
 _CLOCK_BACK_TIMES = 3
 _OUTSTANDING = 16
 _FOREIGN_NAMES = 50
+_GAPS = 1000
 
 
 @dataclass(frozen=True)
@@ -114,7 +116,7 @@ class LinkState:
         self._sequence = SequenceCounter()
         self._meter = RateMeter()
         self._last_heard = -math.inf
-        self._gaps: list[Gap] = []
+        self._gaps: deque[Gap] = deque(maxlen=_GAPS)
         self._round_trip_s = math.nan
         self._asked_at: dict[int, float] = {}
         self._boot_ms = -math.inf

@@ -17,6 +17,7 @@ from magcomp.model import Vehicle
 _SENSOR_COMPASS = 0x04  # MAV_SYS_STATUS_SENSOR_3D_MAG
 _FIELD_MESSAGES = {1: Message.RAW_IMU, 2: Message.SCALED_IMU2, 3: Message.SCALED_IMU3}
 _STALE_US = 2_000_000
+_MOST_SENDERS = 64
 _MILLI_G = 9.80665e-3
 
 Vector = tuple[float, float, float]
@@ -80,10 +81,21 @@ class Latest:
             self._last_us = unix_us
             if message not in WANTED or not _is_of_interest(message, frame):
                 return
+            if sender not in self._frames:
+                self._make_room()
             self._frames.setdefault(sender, {})[message] = (unix_us, frame)
             if message == Message.PARAM_VALUE:
                 sent = payload(frame)
                 self._parameters.setdefault(sender, {})[name_and_field(sent)[0]] = sent
+
+    def _make_room(self) -> None:
+        """Forget who has been silent longest: a flood of senders must cost no memory."""
+        while len(self._frames) >= _MOST_SENDERS:
+            silent = min(
+                self._frames, key=lambda each: max(at for at, _ in self._frames[each].values())
+            )
+            del self._frames[silent]
+            self._parameters.pop(silent, None)
 
     @property
     def span_s(self) -> float:

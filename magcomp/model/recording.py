@@ -97,6 +97,9 @@ class Vehicle:
     uid
         The flight controller's own number (AUTOPILOT_VERSION.uid2, else uid), in hexadecimal;
         empty where unknown.
+    frame
+        How its motors are arranged, in the firmware's words such as ``"HEXA/X"``; empty where
+        unknown.
     """
 
     autopilot: str
@@ -108,6 +111,7 @@ class Vehicle:
     board: str = ""
     capabilities: int = 0
     uid: str = ""
+    frame: str = ""
 
     @property
     def device_ids(self) -> tuple[int, ...]:

@@ -34,6 +34,8 @@ def by_grade(document: Document) -> dict[str, list[int]]:
 def headline(document: Document) -> str:
     """The verdict in one sentence."""
     grades = by_grade(document)
+    if document["only_to_look_at"]:
+        return "To look at: the firmware cannot multiply what was fitted against."
     if len(grades) == 1:
         return _ALONE[next(iter(grades))]
     parts = [f"{grade} for {words.compasses(numbers)}" for grade, numbers in grades.items()]
@@ -51,6 +53,8 @@ def steps(document: Document, options: Options | None = None) -> tuple[str, ...]
         What was asked for, so that the command named here gives the same answer.
     """
     grades = by_grade(document)
+    if document["only_to_look_at"]:
+        return (f"Write nothing: {document['only_to_look_at']}.",)
     kept = [number for grade in GRADES[:2] for number in grades.get(grade, ())]
     if not kept:
         return (

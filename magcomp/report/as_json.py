@@ -43,6 +43,7 @@ def analysis_object(analysis: Analysis, written: str | None = None) -> dict[str,
         "verdict": analysis.grade.value,
         "compasses": [_compass(result) for result in analysis.compasses],
         "notes": list(analysis.notes),
+        "only_to_look_at": analysis.only_to_look_at or None,
         "written": written,
     }
 

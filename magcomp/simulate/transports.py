@@ -2,7 +2,8 @@
 
 =====================  ============================================================
 udpout:HOST:PORT       sends to a listening ground station, as real simulations do
-udp:HOST:PORT          listens, and answers whoever spoke last (same as udpin:)
+udp:HOST:PORT          listens, and answers whoever spoke last (same as udpin:); udp:PORT
+                       listens to this computer only
 tcpin:HOST:PORT        listens for one ground station at a time
 tcp:HOST:PORT          connects to a listening ground station
 pty                    a pseudo-terminal, for programs that want a serial port
@@ -23,6 +24,8 @@ from magcomp.errors import AddressError, LinkError
 _CHUNK = 65536
 _MOST_PENDING = 65536
 _CONNECT_S = 5.0
+_LOOPBACK = "127.0.0.1"
+_LISTENING = ("udp", "udpin", "tcpin")
 
 
 class Transport(Protocol):
@@ -50,15 +53,18 @@ class Udp:
     local
         Host and port to listen at.
     peer
-        Whom to send to before anybody has spoken; None to wait.
+        Whom to speak to, and to no other; None to wait until somebody speaks.
     """
 
     def __init__(self, local: tuple[str, int], peer: tuple[str, int] | None = None) -> None:
         self._peer = peer
+        self._last: tuple[str, int] | None = None
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
         try:
             self._socket.bind(local)
+            if peer is not None:
+                self._socket.connect(peer)
         except OSError as error:
             self._socket.close()
             raise _unusable("UDP", local, error) from error
@@ -77,15 +83,18 @@ class Udp:
         if not ready:
             return b""
         with contextlib.suppress(OSError):
-            data, self._peer = self._socket.recvfrom(_CHUNK)
+            data, peer = self._socket.recvfrom(_CHUNK)
+            self._last = peer
             return data
         return b""
 
     def send(self, frame: bytes) -> None:
         """See :class:`Transport`."""
-        if self._peer is not None:
-            with contextlib.suppress(OSError):
-                self._socket.sendto(frame, self._peer)
+        with contextlib.suppress(OSError):
+            if self._peer is not None:
+                self._socket.send(frame)
+            elif self._last is not None:
+                self._socket.sendto(frame, self._last)
 
     def close(self) -> None:
         """See :class:`Transport`."""
@@ -264,6 +273,8 @@ def open_transport(address: str) -> Transport:
     if scheme == "pty" and not rest:
         return PseudoTerminal()
     host, _, port = rest.rpartition(":")
+    if scheme in _LISTENING and not host:
+        host = _LOOPBACK  # whoever wants to be reached from elsewhere says so
     opener = _OPENERS.get(scheme)
     if opener is None or not port.isdecimal() or not 0 <= int(port) <= 65535:
         raise AddressError(

@@ -151,6 +151,11 @@ class Vehicle:
         """How long the programme takes."""
         return self._program.duration_s
 
+    def fly_again(self) -> None:
+        """Carry the programme out once more, with what the autopilot holds by now."""
+        if self.program_over:
+            self._program_tick = self._tick
+
     def receive(self, frame: bytes, time: float) -> None:
         """Take one frame from the ground; what is not a sound MAVLink frame is ignored."""
         self._pass_until(time)

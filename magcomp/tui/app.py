@@ -15,7 +15,7 @@ from textual.screen import Screen
 
 from magcomp.errors import MagcompError, UsageError
 from magcomp.model import Grade
-from magcomp.tui import fitting, opening, status, writing
+from magcomp.tui import fitting, opening, status, verifying, writing
 from magcomp.tui.base import BaseApp
 from magcomp.tui.help_text import help_text, key_lines
 from magcomp.tui.messages import (
@@ -106,6 +106,7 @@ class MagcompApp(BaseApp):
         if self.session is not None:
             self.live = message.snapshot
             opening.watch_vehicle(self)
+            verifying.watch_flight(self)
             self.redraw()
 
     def on_watching_failed(self, message: WatchingFailed) -> None:
@@ -147,12 +148,14 @@ class MagcompApp(BaseApp):
         rejected = work.analysis is not None and work.analysis.grade is Grade.REJECTED
         shown = {
             "forward": bool(work.source and following) and not (following == "review" and rejected),
+            "other_fit": len(work.tried) > 1,
             "report": work.analysis is not None,
             "backward": self.current_mode != road[0],
             "disconnect": bool(work.source),
             "open_log": not work.source,
             "simulate": not work.source,
             "write": work.live,
+            "fly_again": self.simulation is not None and bool(self.writing.in_force),
             "undo": bool(self.writing.in_force),
         }
         return shown.get(action, True)
@@ -175,6 +178,10 @@ class MagcompApp(BaseApp):
         """Fit what is recorded so far."""
         fitting.again(self)
 
+    def action_other_fit(self) -> None:
+        """Show another one of the fits tried."""
+        fitting.show_other(self)
+
     def action_write(self) -> None:
         """Write to the vehicle."""
         writing.ask_write(self)
@@ -186,6 +193,11 @@ class MagcompApp(BaseApp):
     def action_report(self) -> None:
         """Save a report."""
         writing.ask_report(self)
+
+    def action_fly_again(self) -> None:
+        """Let the simulated vehicle fly with what was written."""
+        if self.simulation is not None:
+            self.simulation.fly_again()
 
     def action_undo(self) -> None:
         """Bring the vehicle back to what it held."""

@@ -45,6 +45,14 @@ def again(app: BaseApp) -> None:
     start(app, app.work.options)
 
 
+def show_other(app: BaseApp) -> None:
+    """Show another one of the fits tried."""
+    if app.busy is None:
+        app.set_work(app.work.with_other_fit())
+        app.asked = app.work.options
+        writing.prepare(app)
+
+
 def change(app: BaseApp, **changed: Any) -> None:
     """Fit with other options."""
     try:

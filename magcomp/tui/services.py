@@ -88,10 +88,13 @@ class Simulation:
         How to reach it.
     stop
         Ends it.
+    fly_again
+        Makes it do once more what it did.
     """
 
     address: str
     stop: Callable[[], None]
+    fly_again: Callable[[], None] = lambda: None
 
 
 def open_live(
@@ -112,9 +115,10 @@ def simulate() -> Simulation:
     stop = threading.Event()
     ready: queue.Queue[str | Exception] = queue.Queue()
 
+    vehicle = SimulatedVehicle(scenario("flight", seed=7), wait_for_ground=True)
+
     def live() -> None:
         try:
-            vehicle = SimulatedVehicle(scenario("flight", seed=7), wait_for_ground=True)
             serve("udp:127.0.0.1:0", vehicle, announce=ready.put, stop=stop)
         except MagcompError as error:
             ready.put(error)
@@ -132,7 +136,7 @@ def simulate() -> Simulation:
         stop.set()
         thread.join()
 
-    return Simulation(answer, end)
+    return Simulation(answer, end, vehicle.fly_again)
 
 
 def _now() -> datetime:
@@ -218,6 +222,14 @@ def judge_present(recording: Recording) -> Mapping[int, Verdict]:
     """
     try:
         return check(recording)
+    except MagcompError:
+        return {}
+
+
+def judge_since(recording: Recording, start_s: float) -> Mapping[int, Verdict]:
+    """The judge's word on the calibration in force since some second of a recording."""
+    try:
+        return check(recording, Options(start=start_s))
     except MagcompError:
         return {}
 

@@ -9,7 +9,9 @@ from pathlib import Path
 from magcomp.analysis import Options, parameter_set
 from magcomp.model import Analysis, Grade, ParameterSet, Recording
 from magcomp.tui.changes import ChangeRow
+from magcomp.tui.fits import Tried, with_fit
 from magcomp.tui.pictures import CompassPicture
+from magcomp.tui.promise import Promise
 from magcomp.tui.vehicle_card import VehicleCard
 
 
@@ -35,6 +37,8 @@ class Work:
         Compasses whose parameters are to be written.
     kept
         Where the answer was written: a file, or the vehicle; empty where nowhere yet.
+    tried
+        The fits so far, the shown one among them.
     """
 
     source: str = ""
@@ -46,6 +50,7 @@ class Work:
     pictures: Mapping[int, CompassPicture] = field(default_factory=dict)
     chosen: frozenset[int] = frozenset()
     kept: str = ""
+    tried: tuple[Tried, ...] = ()
 
     @property
     def name(self) -> str:
@@ -76,13 +81,24 @@ class Work:
     def with_analysis(self, analysis: Analysis, pictures: Mapping[int, CompassPicture]) -> Work:
         """The same after a fit: everything not rejected is chosen, nothing is written."""
         good = (c for c in analysis.compasses if c.verdict.grade is not Grade.REJECTED)
+        new = Tried(self.options, self.recording, analysis, pictures)
         return replace(
             self,
+            tried=with_fit(self.tried, new),
             analysis=analysis,
             pictures=pictures,
             chosen=frozenset(result.fit.compass for result in good),
             kept="",
         )
+
+    def with_other_fit(self) -> Work:
+        """The same with the fit tried before the shown one; round and round."""
+        here = [index for index, each in enumerate(self.tried) if each.analysis is self.analysis]
+        if not here or len(self.tried) < 2:
+            return self
+        other = self.tried[here[0] - 1]
+        work = replace(self, options=other.options, recording=other.recording)
+        return replace(work.with_analysis(other.analysis, other.pictures), tried=self.tried)
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +118,12 @@ class Writing:
     before, in_force
         What the vehicle held before it was written, and what it holds since; empty where it was
         not written.
+    promised, since_s
+        The fit that was written, and the second of the recording since when it is in force.
+    flying
+        The motors have run since, and still do.
+    measured, measured_trouble
+        What the flights since showed, or why nothing.
     """
 
     rows: tuple[ChangeRow, ...] = ()
@@ -110,3 +132,8 @@ class Writing:
     result: str = ""
     before: Mapping[str, float] = field(default_factory=dict)
     in_force: Mapping[str, float] = field(default_factory=dict)
+    promised: Analysis | None = None
+    since_s: float = 0.0
+    flying: bool = False
+    measured: tuple[Promise, ...] = ()
+    measured_trouble: str = ""

@@ -189,11 +189,13 @@ def _write(app: BaseApp, plan: WritePlan, backup: Path) -> None:
     if session is None:
         return
 
-    def task(progress: Progress) -> Outcome:
+    def task(progress: Progress) -> tuple[Outcome, float]:
         backup.parent.mkdir(parents=True, exist_ok=True)
-        return session.upload(plan, backup, _follow(app, progress), app.stopping.is_set)
+        outcome = session.upload(plan, backup, _follow(app, progress), app.stopping.is_set)
+        return outcome, session.recording().duration_s if outcome.good else 0.0
 
-    def then(outcome: Outcome) -> None:
+    def then(ended: tuple[Outcome, float]) -> None:
+        outcome, since_s = ended
         app.note_file("Backup", backup)
         app.writing = replace(app.writing, backup=backup)
         if _ended(app, outcome, backup):
@@ -203,6 +205,10 @@ def _write(app: BaseApp, plan: WritePlan, backup: Path) -> None:
                 result=f"all {len(app.writing.rows)} parameters read back as written",
                 before=plan.old,
                 in_force=now,
+                promised=app.work.analysis,
+                since_s=since_s,
+                measured=(),
+                measured_trouble="",
             )
             app.set_work(replace(app.work, kept="the vehicle"))
 

@@ -53,6 +53,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from magcomp import autopilots
 from magcomp.mavlink.parameters import REAL32, ParamValue, fits
 from magcomp.writing.events import (
     Event,
@@ -127,7 +128,7 @@ class WriteSequence:
 
     def __init__(self, plan: WritePlan, *, now: float, timing: Timing | None = None) -> None:
         self._plan = plan
-        self._timing = timing or Timing()
+        self._timing = timing or Timing(storing=autopilots.of(plan.vehicle).storage_s)
         self._values: Mapping[str, float] = plan.new
         self._switches: Mapping[str, float] = plan.switches
         self._rolling_back: RollingBack | None = None
@@ -170,7 +171,7 @@ class WriteSequence:
         elif isinstance(message, ParamValue):
             self._take_value(message, now)
         elif isinstance(message, ParamRefused) and self._exchange.differ(message.name):
-            self._fail(Reason.REFUSED, f"{message.name} was not taken: {message.reason}", now)
+            self._take_refusal(message, now)
         elif isinstance(message, OwnNumber):
             self._take_own_number(message.uid)
 
@@ -235,6 +236,15 @@ class WriteSequence:
             del self._unconfirmed[name]
         done, total = self._exchange.answered, self._exchange.total
         self._events.append(Progress(self.stage, name, done, total))
+
+    def _take_refusal(self, message: ParamRefused, now: float) -> None:
+        name = message.name
+        if self._rolling_back is not None and name in self._unconfirmed:
+            # What takes no write still holds its old value: VERIFY will tell.
+            del self._unconfirmed[name]
+            self._exchange.answer(name)
+            return
+        self._fail(Reason.REFUSED, f"{name} was not taken: {message.reason}", now)
 
     def _take_own_number(self, uid: str) -> None:
         wanted = self._plan.vehicle.uid

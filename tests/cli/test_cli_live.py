@@ -64,6 +64,7 @@ def test_upload_shows_the_difference_writes_it_and_says_how_to_undo_it(
         assert "COMPASS_MOTCT" in out
         assert "0 → 2" in out
         assert "Written and read back: 37 parameters" in err
+        assert "The vehicle holds: motor compensation by current for compasses 1, 2 and 3." in err
         (backup,) = data_directory.glob("backup-ardupilot-1-*.param")
         assert f"magcomp restore {backup} {flown.address}" in err
         assert magcomp("restore", backup, flown.address, "--yes", "--system", 1) == ExitCode.GOOD
@@ -71,6 +72,7 @@ def test_upload_shows_the_difference_writes_it_and_says_how_to_undo_it(
         out, err = capsys.readouterr()
         assert "2 → 0" in out
         assert "the vehicle held everything that was written" in err
+        assert "The vehicle holds: motor compensation off." in err
         assert magcomp("restore", backup, flown.address, "--yes", "--system", 1) == ExitCode.GOOD
         assert "nothing is written" in capsys.readouterr().err
 

@@ -68,3 +68,13 @@ def test_the_accelerometer_is_read_in_metres_per_second_squared():
     raw = mavlink.MAVLink_raw_imu_message(0, 100, -200, -1000, 0, 0, 0, 1, 2, 3)
     latest.add(1, bytes(raw.pack(mavlink.MAVLink(None, 1, 1))))
     assert latest.now(VEHICLE).accel == pytest.approx((0.980665, -1.96133, -9.80665))
+
+
+def test_a_flood_of_senders_costs_no_memory_and_forgets_no_vehicle_that_speaks():
+    latest, ours = Latest(), FakeVehicle()
+    for number in range(300):
+        latest.add(UNIX_US + number, ours.heartbeat())
+        stranger = FakeVehicle(number % 250 + 2, number % 200 + 2)
+        latest.add(UNIX_US + number, stranger.heartbeat())
+    assert latest.now(VEHICLE).armed is not None
+    assert len(latest._frames) <= 64

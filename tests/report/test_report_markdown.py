@@ -79,3 +79,11 @@ def test_a_parameter_the_log_does_not_hold_is_said_in_words() -> None:
 @pytest.mark.parametrize("make", CASES)
 def test_there_is_no_number_that_is_none(make) -> None:
     assert not re.search(r"\b(nan|None|inf)\b", markdown(make().document, make().present))
+
+
+def test_a_fit_that_is_only_to_look_at_is_not_said_to_be_worth_writing() -> None:
+    document = {**still().document, "only_to_look_at": "the firmware multiplies something else"}
+    page = markdown(document, still().present)
+    assert "Write nothing: the firmware multiplies something else." in page
+    assert "worth writing" not in page
+    assert "-o compass.param" not in page

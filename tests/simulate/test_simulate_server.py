@@ -12,6 +12,7 @@ from pymavlink import mavutil
 
 from magcomp.errors import AddressError, LinkError, UsageError
 from magcomp.simulate import Vehicle, scenario, serve
+from magcomp.simulate.transports import open_transport
 
 WITHIN_S = 10
 
@@ -150,3 +151,23 @@ def test_nobody_there_is_one_sentence():
 def test_an_impossible_speed_is_refused(speed):
     with pytest.raises(UsageError, match="speed must be greater than 0"):
         serve("udp:127.0.0.1:0", Vehicle(scenario("sweep", 1)), speed=speed)
+
+
+def test_a_vehicle_that_speaks_to_one_ground_station_hears_no_other():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as ground:
+        ground.bind(("127.0.0.1", 0))
+        port = ground.getsockname()[1]
+        with contextlib.closing(open_transport(f"udpout:127.0.0.1:{port}")) as vehicle:
+            vehicle.send(b"hello")
+            ground.settimeout(10.0)
+            _, where = ground.recvfrom(100)
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+                stranger.sendto(b"arm", ("127.0.0.1", where[1]))
+            ground.sendto(b"disarm", where)
+            assert vehicle.wait(10.0) == b"disarm"
+
+
+@pytest.mark.parametrize("address", ["udp:0", "tcpin:0"])
+def test_a_listening_vehicle_is_reached_from_this_computer_only_unless_told(address):
+    with contextlib.closing(open_transport(address)) as vehicle:
+        assert ":127.0.0.1:" in vehicle.reached_at

@@ -82,7 +82,7 @@ def flown(request, tmp_path_factory) -> Recording:
 def test_a_flight_is_read_in_the_models_units(flown: Recording) -> None:
     assert (flown.format, flown.duration_s) == ("dataflash", pytest.approx(12.9, abs=0.1))
     assert (flown.vehicle.kind, flown.vehicle.firmware) == ("copter", "4.5.7")
-    assert flown.vehicle.board == "CubeOrange"
+    assert (flown.vehicle.board, flown.vehicle.frame) == ("CubeOrange", "HEXA/X")
     assert flown.vehicle.device_ids == (97539,)
     assert sorted(flown.field) == [1, 2]
     np.testing.assert_array_equal(flown.field[2].value[3], (203, -3, 401))
@@ -195,6 +195,18 @@ def test_garbage_between_records_costs_nothing_but_itself(tmp_path: Path) -> Non
     assert found.report.skipped == garbage
     assert found.report.used == whole.report.used
     np.testing.assert_array_equal(found.field[1].value, whole.field[1].value)
+
+
+@pytest.mark.parametrize("told", [0, 3, 30, 60, 255])
+def test_a_format_that_lies_about_its_length_costs_no_reading(tmp_path: Path, told: int) -> None:
+    log = short_flight()
+    whole = from_bytes(tmp_path, log.binary())
+    honest = MAG.definition()
+    assert log.binary().count(honest) == 1
+    found = from_bytes(tmp_path, log.binary().replace(honest, MAG.definition(told)))
+    assert found.report.skipped == 0
+    assert found.report.frames == whole.report.frames
+    np.testing.assert_array_equal(found.field[2].value, whole.field[2].value)
 
 
 def test_a_header_inside_a_record_is_no_record(tmp_path: Path) -> None:

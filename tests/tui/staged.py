@@ -11,10 +11,12 @@ import made
 import scripted
 from scripted import ScriptedSession, until
 
+from magcomp.analysis import Options
 from magcomp.live.situation import Situation
 from magcomp.model import Grade
 from magcomp.tui import MagcompApp, writing
 from magcomp.tui.changes import READ_BACK
+from magcomp.tui.promise import Promise
 from magcomp.tui.screens.dialogs import Confirm, Message
 from magcomp.tui.status import STEPS
 from magcomp.tui.work import Work
@@ -85,6 +87,17 @@ async def fit_verdict(pilot: Any) -> None:
     await pilot.press("v", "v", "v", "2")
 
 
+async def fit_fits(pilot: Any) -> None:
+    await _log(pilot, "fit", Grade.GOOD, Grade.GOOD)
+    app = pilot.app
+    for method, grade in (("levels", Grade.MARGINAL), ("sweep", Grade.REJECTED)):
+        other = made.analysis(grade, Grade.GOOD)
+        work = replace(app.work, options=Options(method=method))
+        app.set_work(work.with_analysis(other, made.pictures(other)))
+    app.action_other_fit()
+    await pilot.press("v", "v", "v", "v")
+
+
 async def review_log(pilot: Any) -> None:
     await _log(pilot, "review", Grade.GOOD, Grade.GOOD, Grade.REJECTED)
 
@@ -135,6 +148,22 @@ async def verify_moved(pilot: Any) -> None:
     await until(pilot, lambda: app.live is app.session.shown)
 
 
+async def verify_measured(pilot: Any) -> None:
+    await _live(pilot, "verify", made.work(live=True), armed=False, situation=Situation.FLYING)
+    app = pilot.app
+    held = made.parameters()
+    app.writing = replace(
+        app.writing,
+        before=held,
+        in_force=held,
+        measured=tuple(
+            Promise(compass, 24.0, "current", 0.4, measured, 0.1)
+            for compass, measured in ((1, 0.3), (2, 0.45), (3, 1.2))
+        ),
+    )
+    app.redraw()
+
+
 async def trouble(pilot: Any) -> None:
     await fit_heading(pilot)
     message = Message(
@@ -171,6 +200,7 @@ STAGES: tuple[Stage, ...] = (
     fit_shift,
     fit_unexplained,
     fit_verdict,
+    fit_fits,
     fit_in_sunlight,
     review_log,
     review,
@@ -178,6 +208,7 @@ STAGES: tuple[Stage, ...] = (
     review_written,
     verify,
     verify_moved,
+    verify_measured,
     trouble,
     help_for_fit,
 )

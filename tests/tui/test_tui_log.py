@@ -15,6 +15,7 @@ from truth import FIXTURES
 
 from magcomp.cli.app import app as command_line
 from magcomp.fit import METHODS
+from magcomp.tui.fits import fit_rows
 from magcomp.tui.screens.dialogs import Confirm, Message
 from magcomp.writing.files import read_parameter_file
 
@@ -111,6 +112,25 @@ async def test_a_time_that_is_no_number_is_said_to_be_none(tmp_path):
         await press(pilot, "tab", "enter")
         await until(pilot, lambda: "instead received 'soon'" in screen(pilot.app))
         assert pilot.app.screen.focused is pilot.app.screen.query(Input).first()
+
+
+async def test_fits_of_two_time_ranges_stand_side_by_side_and_either_can_be_shown(tmp_path):
+    app = scripted.app(tmp_path, str(SWEEP))
+    async with app.run_test(size=(120, 40)) as pilot:
+        await fitted(pilot)
+        whole = app.work.analysis
+        await pilot.press("t")
+        first, last = app.screen.query(Input)
+        first.value, last.value = "10", "70"
+        await press(pilot, "enter")
+        await until(pilot, lambda: app.work.analysis is not whole)
+        await until(pilot, lambda: "10 … 70 s" in screen(app).split("Fits side by side")[-1])
+        await press(pilot, "p")
+        await until(pilot, lambda: app.work.analysis is whole)
+        assert "T time whole" in screen(app)
+        rows = {row.number: row for row in fit_rows(app.work.tried, whole, 1)}
+        assert rows[1].apart < 1e-6
+        assert 0.0 < rows[2].apart < 1.0
 
 
 async def test_every_method_is_reached_and_one_that_cannot_fit_does_not_end_the_round(tmp_path):

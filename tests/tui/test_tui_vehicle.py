@@ -10,12 +10,16 @@ import made
 import pytest
 import scripted
 from scripted import ScriptedSession, press, screen, until
+from truth import FIXTURES
 
+from magcomp.analysis import check
 from magcomp.errors import LinkError, LinkTimeoutError, VehicleRefusedError, WriteError
 from magcomp.live.guide import Guidance
 from magcomp.live.situation import Situation
 from magcomp.model import Grade, ParameterChange, ParameterHistory
+from magcomp.sources import read
 from magcomp.tui import opening, writing
+from magcomp.tui.promise import Promise
 from magcomp.tui.screens.connect import AddressInput
 from magcomp.tui.screens.dialogs import Confirm, Message
 from magcomp.tui.status import link_words
@@ -401,6 +405,44 @@ async def test_after_writing_before_is_worked_out_from_the_backup(tmp_path):
         pair = pilot.app.screen._pairs[0]
         assert pair.before == pytest.approx(unwritten, abs=0.2)
         assert pair.after == pytest.approx(315.0, abs=0.2)
+
+
+async def test_after_the_next_flight_the_promise_stands_beside_what_was_measured(tmp_path):
+    flown = read(FIXTURES / "mission_compensated.tlog")
+    session = disarmed()
+    app = scripted.app(tmp_path, session=session)
+    async with app.run_test(size=(120, 40)) as pilot:
+        await fitted(pilot)
+        await press(pilot, "w", "y")
+        await until(pilot, lambda: app.work.kept)
+        await press(pilot, "n")
+        await until(pilot, lambda: "Fly as before and land" in screen(app))
+        app.writing = replace(app.writing, since_s=0.0)
+        session.recorded = flown
+        session.change(armed=True, situation=Situation.FLYING)
+        await until(pilot, lambda: app.writing.flying)
+        assert not app.writing.measured
+        session.change(armed=False)
+        await until(pilot, lambda: app.writing.measured)
+        await until(pilot, lambda: "promised at most" in screen(app))
+        worst = {
+            number: max(r.before for r in v.heading_error) for number, v in check(flown).items()
+        }
+        for promise in app.writing.measured:
+            assert 0.0 < promise.measured <= worst[promise.compass]
+            assert promise.promised == pytest.approx(0.1 + 0.006 * promise.u, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("measured", "doubt", "says"),
+    [
+        (0.3, 0.1, "promised at most 0.4°, measured 0.3° ✓"),
+        (0.5, 0.2, "measured 0.5° ?: more than promised, but"),
+        (1.2, 0.2, "measured 1.2° ✗: more than promised, so fit this flight"),
+    ],
+)
+def test_a_promise_is_kept_broken_or_not_to_be_told(measured, doubt, says):
+    assert says in Promise(1, 24.0, "current", 0.4, measured, doubt).sentence
 
 
 def _at(current: float, *, written: bool = False):

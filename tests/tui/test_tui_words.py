@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from dataclasses import replace
 
 import made
 import numpy as np
@@ -15,11 +16,13 @@ from rich.cells import cell_len
 from scripted import screen, until
 from textual.color import Color
 
+from magcomp.analysis import Options
 from magcomp.live.progress import Bound, HoverBound, hover_bound
 from magcomp.model import Grade, ParameterSet
 from magcomp.tui.ascii import is_ascii_only, plain
 from magcomp.tui.before_after import HeadingPair, HeadingWatch, heading_pairs
 from magcomp.tui.changes import after_event, change_rows
+from magcomp.tui.fits import difference_deg, fit_rows
 from magcomp.tui.pictures import round_ticks
 from magcomp.tui.themes import SUN
 from magcomp.tui.widgets.bars import bar
@@ -84,6 +87,31 @@ def test_in_sunlight_every_colour_stands_out_seven_to_one():
     inks = (SUN.foreground, SUN.primary, SUN.accent, SUN.success, SUN.warning, SUN.error)
     for ink in (*inks, SUN.variables["quiet"]):
         assert (paper + 0.05) / (luminance(ink) + 0.05) >= 7.0
+
+
+def test_fits_that_agree_are_not_apart_and_one_per_ampere_off_is_apart_by_its_angle():
+    one = made.result(1).fit
+    assert difference_deg(one, one) < 1e-9
+    off = replace(one.correction, motor=one.correction.motor + np.array([0.0, 1.0, 0.0]))
+    horizontal = np.sqrt(one.strength**2 - one.vertical**2)
+    level = np.degrees(np.arcsin(min(54.0 / horizontal, 1.0)))
+    assert difference_deg(one, replace(one, correction=off)) >= level * 0.95
+
+
+def test_a_fit_made_anew_with_the_same_options_takes_the_place_of_the_old_one():
+    work = made.work()
+    again = work.with_analysis(made.analysis(), work.pictures)
+    assert len(again.tried) == 1
+    other = replace(again, options=Options(method="sweep"))
+    other = other.with_analysis(made.analysis(Grade.MARGINAL), work.pictures)
+    assert len(other.tried) == 2
+    back = other.with_other_fit()
+    assert back.analysis is again.analysis
+    assert back.options == again.options
+    assert back.with_other_fit().analysis is other.analysis
+    rows = fit_rows(back.tried, back.analysis, 1)
+    assert [row.shown for row in rows] == [True, False]
+    assert [row.grade for row in rows] == [Grade.GOOD, Grade.MARGINAL]
 
 
 def test_the_live_bound_is_that_of_the_worst_compass_worth_writing_at_the_hover():

@@ -283,3 +283,15 @@ def check_claim(standing: Standing, held: dict[str, float]) -> None:
             assert held["COMPASS_MOTCT"] == 0
         case Standing.UNSURE:
             assert held in (OLD, NEW) or held["COMPASS_MOTCT"] == 0
+
+
+@pytest.mark.parametrize("words", [True, False])
+def test_what_is_denied_is_left_as_it_is_and_all_else_brought_back(
+    tmp_path: Path, words: bool
+) -> None:
+    """The vehicle denies two names, before and in the roll-back."""
+    autopilot = FakeAutopilot(OLD, read_only=frozenset({"COMPASS_MOT_Y", "COMPASS_ODI3_Z"}))
+    autopilot.reports_errors, autopilot.denies_in_words = not words, words
+    outcome = upload(FakeLink(autopilot, VirtualClock()), tmp_path / "b.param")
+    assert outcome.standing is Standing.OLD
+    assert autopilot.calibration() == OLD

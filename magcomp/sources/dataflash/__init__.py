@@ -148,6 +148,7 @@ def _vehicle(who: Identity, values: Mapping[str, float]) -> Vehicle:
         compasses=autopilots.named(_AUTOPILOT).compasses(values),
         board=who.board,
         uid=who.uid,
+        frame=who.frame,
     )
 
 

@@ -38,6 +38,9 @@ _TYPES: dict[str, str] = {
     "E": "<u4", "f": "<f4", "g": "<f2", "h": "<i2", "H": "<u2", "i": "<i4", "I": "<u4",
     "L": "<i4", "M": "u1", "n": "S4", "N": "S16", "q": "<i8", "Q": "<u8", "Z": "S64",
 }  # fmt: skip
+_SIZES = np.zeros(256, dtype=np.intp)
+_SIZES[[ord(kind) for kind in _TYPES]] = [np.dtype(code).itemsize for code in _TYPES.values()]
+_ENOUGH_ROWS = 1000
 _NAME = re.compile(rb"[A-Za-z0-9_]{1,4}")
 _KINDS = re.compile(rb"[%s]{0,16}" % "".join(_TYPES).encode())
 
@@ -71,7 +74,7 @@ def unpack(octets: ByteArray, wanted: Collection[str]) -> Unpacked:
     candidates = _candidates(octets)
     numbers = octets[candidates + 2]
     places = _whole(candidates[numbers == _FORMAT], len(octets), _FORMAT_RECORD.itemsize)
-    formats = _formats(octets, places)
+    formats = _sized(octets, candidates, numbers, _formats(octets, places))
     found = _Records(octets, candidates, numbers, formats)
     # A format that stands in a message's text, and not in the log's own table, describes nothing.
     own = found.hold(np.array([each.place for each in formats], dtype=np.intp))
@@ -127,9 +130,41 @@ def _formats(octets: ByteArray, places: IntArray) -> list[_Format]:
         if last.get(number) == whole or not _NAME.fullmatch(name) or not _KINDS.fullmatch(kinds):
             continue
         last[number] = whole
-        if size >= _HEAD_SIZE:
-            found.append(_Format(place, number, size, name.decode(), kinds, columns))
+        found.append(_Format(place, number, size, name.decode(), kinds, columns))
     return found
+
+
+def _sized(
+    octets: ByteArray, candidates: IntArray, numbers: ByteArray, formats: list[_Format]
+) -> list[_Format]:
+    """Formats with the length that their letters make, where the told one is a lie.
+
+    It is one where another record stands after the former more often than after the latter.
+    """
+    if not formats:
+        return []
+    letters = np.array([each.kinds for each in formats], dtype="S16")
+    sizes = _HEAD_SIZE + _SIZES[letters.view(np.uint8).reshape(len(formats), 16)].sum(axis=1)
+    told = np.array([each.size for each in formats])
+    result = list(formats)
+    places: dict[int, IntArray] = {}
+    for index in np.flatnonzero(sizes != told).tolist():
+        each, size = formats[index], int(sizes[index])
+        if each.number not in places:
+            places[each.number] = candidates[numbers == each.number][:_ENOUGH_ROWS]
+        rows = places[each.number]
+        possible = each.size >= _HEAD_SIZE
+        as_told = _ending(octets, rows + each.size) if possible else 0
+        if _ending(octets, rows + size) > as_told:
+            result[index] = each._replace(size=size)
+    return [each for each in result if each.size >= _HEAD_SIZE]
+
+
+def _ending(octets: ByteArray, ends: IntArray) -> int:
+    """How many ends of records have a header, or the end of the log, after them."""
+    inside = ends[ends < len(octets) - 1]
+    heads = (octets[inside] == _HEAD[0]) & (octets[inside + 1] == _HEAD[1])
+    return int(np.count_nonzero(heads) + np.count_nonzero(ends == len(octets)))
 
 
 def _layout(definition: Definition, size: int) -> np.dtype[Any] | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from typing import ClassVar, TypeVar
 
@@ -16,9 +15,11 @@ from magcomp.analysis import Options
 from magcomp.fit import METHODS
 from magcomp.model import CURRENT, Analysis, Grade
 from magcomp.report import words
+from magcomp.tui.fits import fit_rows, time_range
 from magcomp.tui.messages import OptionsChosen, TimeRangeWanted
 from magcomp.tui.pictures import AXES, CompassPicture
 from magcomp.tui.screens.step import StepScreen
+from magcomp.tui.widgets.fits_table import FitsTable
 from magcomp.tui.widgets.heading_table import HeadingTable
 from magcomp.tui.widgets.plots import ShiftPlot, UnexplainedPlot
 from magcomp.tui.widgets.verdict_text import ReasonLine, VerdictText, grade_word
@@ -28,6 +29,7 @@ VIEWS = {
     "shift": "Field the motors add, mGauss",
     "unexplained": "Unexplained field, mGauss",
     "verdict": "Verdict",
+    "fits": "Fits side by side",
 }
 _OPTION_KEYS = ("fit.method", "fit.regressor", "fit.compasses", "fit.time")
 
@@ -44,7 +46,8 @@ class FitScreen(StepScreen):
 **The fit.** How far the motors push each compass, and what the correction leaves.
 
 One picture at a time on a small screen: V shows the next. 1, 2 and 3 choose the compass. M, R, T
-and C change method, regressor, time range and compasses, and fit again at once.
+and C change method, regressor, time range and compasses, and fit again at once; every fit is kept,
+*fits side by side* compares them, and P shows another one.
 """
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("1", "compass(1)", "Compass", id="compass.1", key_display="1-3"),
@@ -56,6 +59,7 @@ and C change method, regressor, time range and compasses, and fit again at once.
         Binding("r", "regressor", "Other regressor", id="fit.regressor", show=False),
         Binding("c", "compasses", "Fit all compasses, or one", id="fit.compasses", show=False),
         Binding("t", "time", "Other time range", id="fit.time", show=False),
+        Binding("p", "app.other_fit", "Other fit", id="fit.other"),
         Binding("f", "app.fit", "Fit again", id="fit.again"),
         Binding("e", "app.report", "Report", id="fit.report"),
         Binding("b", "app.backward", "Back", id="go.back"),
@@ -83,6 +87,8 @@ and C change method, regressor, time range and compasses, and fit again at once.
                 yield UnexplainedPlot(id="unexplained")
             with Container(id="view-verdict", classes="view"):
                 yield VerdictText(id="verdict")
+            with VerticalScroll(id="view-fits", classes="view"):
+                yield FitsTable(id="fits")
         yield Static(id="nothing", classes="nothing")
 
     def on_mount(self) -> None:
@@ -100,6 +106,7 @@ and C change method, regressor, time range and compasses, and fit again at once.
             bar.update(progress=busy.share)
         analysis = work.analysis
         self.set_class(analysis is None, "-nothing")
+        self.set_class(len(work.tried) > 1, "-several")
         self.query_one("#options", Static).update(
             options_line(work.options, analysis, [self._key(name) for name in _OPTION_KEYS])
         )
@@ -127,6 +134,8 @@ and C change method, regressor, time range and compasses, and fit again at once.
         self.query_one(ShiftPlot).show(shown.shift)
         self.query_one(UnexplainedPlot).show(shown.unexplained)
         self.query_one(VerdictText).show(shown.result, analysis.notes)
+        rows = fit_rows(self.state.work.tried, analysis, self._compass)
+        self.query_one(FitsTable).show(rows)
         residual = shown.result.verdict.residual
         self.query_one("#view-unexplained").border_title = (
             f"{VIEWS['unexplained']}: {residual.held_out_before:.1f} → {residual.after:.1f}, "
@@ -176,7 +185,10 @@ and C change method, regressor, time range and compasses, and fit again at once.
 
     def action_view(self) -> None:
         """Show the next view."""
-        names = list(VIEWS)
+        several = len(self.state.work.tried) > 1
+        names = [name for name in VIEWS if several or name != "fits"]
+        if self._view not in names:
+            self._view = names[-1]
         self._view = names[(names.index(self._view) + 1) % len(names)]
         self._show_view()
 
@@ -217,14 +229,6 @@ def options_line(options: Options, analysis: Analysis | None, keys: Sequence[str
         for key, (name, value) in zip(keys, parts, strict=True)
     ]
     return Content(" ").join(texts)
-
-
-def time_range(options: Options) -> str:
-    """``whole``, or ``20 … 60 s``."""
-    start, end = max(options.start, 0.0), options.end
-    if math.isinf(end):
-        return "whole" if start == 0.0 else f"from {start:g} s"
-    return f"{start:g} … {end:g} s"
 
 
 def grades_line(analysis: Analysis, shown: int) -> Content:

@@ -78,7 +78,7 @@ class StepScreen(Screen[None]):
         """Look for the keys anew, but only where they may differ: it is not cheap."""
         work, writing = self.state.work, self.state.writing
         grade = None if work.analysis is None else work.analysis.grade
-        bindings = work.source, work.live, bool(writing.in_force), grade
+        bindings = work.source, work.live, bool(writing.in_force), grade, len(work.tried)
         if bindings != self._bindings_drawn:
             self._bindings_drawn = bindings
             self.refresh_bindings()

@@ -14,6 +14,7 @@ from textual.widgets import Static
 from magcomp.live.situation import Situation
 from magcomp.tui.before_after import HeadingPair, HeadingWatch, heading_pairs
 from magcomp.tui.screens.step import StepScreen
+from magcomp.tui.state import State
 from magcomp.tui.widgets.heading_pairs import HeadingPairs, HeadingPlot
 from magcomp.tui.widgets.live_table import ControlBars
 
@@ -30,6 +31,7 @@ class VerifyScreen(StepScreen):
         Binding("2", "compass(2)", "Compass 2", id="compass.2", show=False),
         Binding("3", "compass(3)", "Compass 3", id="compass.3", show=False),
         Binding("m", "mark", "Mark heading", id="verify.mark"),
+        Binding("f", "app.fly_again", "Fly again", id="verify.fly"),
         Binding("u", "app.undo", "Undo writing", id="review.undo"),
         Binding("b", "app.backward", "Back", id="go.back"),
         Binding("x", "app.disconnect", "Disconnect", id="connect.close"),
@@ -77,25 +79,23 @@ class VerifyScreen(StepScreen):
         self.say(state.busy.sentence if state.busy is not None else self._next())
 
     def _show_state(self) -> None:
-        state = self.state
-        if state.writing.in_force:
-            said = "The new parameters are in force; “before” is worked out from the backup."
-        elif state.work.analysis is not None:
-            said = "Nothing is written yet; “corrected” is worked out from the fit."
-        else:
-            said = "Nothing is fitted yet, so there is nothing to compare."
+        said = "\n".join(f" {line}" for line in state_lines(self.state))
         if said != self._said:
             self._said = said
-            self.query_one("#held-now", Static).update(Content(f" {said}"))
+            self.query_one("#held-now", Static).update(Content(said))
 
     def _next(self) -> str:
-        live = self.state.live
+        live, writing = self.state.live, self.state.writing
         if live is not None and not live.connected:
             return "The link is lost: stay here, it goes on when the link is back."
         if live is not None and live.armed and live.situation is Situation.FLYING:
             return "Hold a heading, climb and descend: “takes out” grows with the throttle."
+        if writing.measured:
+            return "Done: Q ends and says where your files are. Or fly again to measure again."
+        if writing.in_force and not self._watch.marked:
+            return "Fly as before and land: it is then measured. On the ground: M, see F1."
         if not self._watch.marked:
-            return "Tie it down, press M, then run the motors: watch “moved”."
+            return "Propellers off or tied down: press M, run the motors, watch “moved”."
         return "With the motors “before” moves, “corrected” stays. Q ends."
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:  # noqa: ARG002
@@ -116,3 +116,17 @@ class VerifyScreen(StepScreen):
         """Measure from the headings as they are."""
         self._watch.mark(self._pairs)
         self.redraw()
+
+
+def state_lines(state: State) -> tuple[str, ...]:
+    """What is in force, and what the flights since have shown."""
+    writing = state.writing
+    if writing.measured:
+        return tuple(promise.sentence for promise in writing.measured)
+    if writing.measured_trouble:
+        return (writing.measured_trouble,)
+    if writing.in_force:
+        return ("The new parameters are in force; “before” is worked out from the backup.",)
+    if state.work.analysis is not None:
+        return ("Nothing is written yet; “corrected” is worked out from the fit.",)
+    return ("Nothing is fitted yet, so there is nothing to compare.",)

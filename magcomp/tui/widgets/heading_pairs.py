@@ -23,6 +23,9 @@ class HeadingPairs(Drawn[tuple[bool, tuple[HeadingPair, ...]]]):
 **Before and after.** *Before* is the heading with the old calibration, *corrected* with the new
 one; *takes out* is the difference at this moment.
 
+After a write, fly as before and land: what the fit promised then stands beside what the flight
+shows. On the ground the propellers must be off, or the vehicle well tied down and nobody near.
+
 Hold the vehicle still and tied down, press M to mark its heading, then change the throttle:
 *before* moves with the motors, *corrected* should stay. In flight hold a heading and watch *takes
 out* grow with the throttle.
@@ -42,7 +45,7 @@ out* grow with the throttle.
         marked, pairs = data
         if not pairs:
             return Content(" no compass reports yet")
-        column = max((width - _TITLE - 14) // 2, 20)
+        column = max((width - _TITLE - 10) // 2, 14)
         head = f"{'':{_TITLE}}{'before':<{column}}{'corrected':<{column}}takes out"
         lines = [Content.styled(head, "$quiet")]
         for pair in pairs:
