@@ -263,7 +263,7 @@ def unseen(parameters: ParameterHistory, compass: int) -> tuple[str, ...]:
 
     A firmware without soft iron or scale has no such name for any compass. A log that lacks a
     whole kind shows such a firmware only if it holds the vehicle's whole list, or at least all of
-    what every firmware has.
+    what every firmware has: and one that has scales has soft iron too, one that has OFS has MOT.
     """
     names = (*acting_on(compass), COMPENSATION_SWITCH)
     missing = [name for name in names if not parameters.of(name)]
@@ -271,6 +271,9 @@ def unseen(parameters: ParameterHistory, compass: int) -> tuple[str, ...]:
     if not parameters.whole and any(name in missing for name in always):
         return tuple(missing)
     kinds = {kind for name, kind in _KIND_OF.items() if parameters.of(name)}
+    if kinds & {Kind.OFF_DIAGONAL, Kind.SCALE}:
+        kinds |= {Kind.DIAGONAL, Kind.OFF_DIAGONAL}
+    kinds |= {_KIND_OF[name] for name in always if name in _KIND_OF}
     return tuple(name for name in missing if _KIND_OF[name] in kinds)
 
 

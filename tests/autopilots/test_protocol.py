@@ -196,6 +196,15 @@ def test_what_a_firmware_does_not_have_at_all_is_not_unseen(kinds, whole):
     assert unseen(without(*lacking, whole=whole), 1) == ()
 
 
+@pytest.mark.parametrize("kind", ["MOT", "OFS", "DIA", "ODI"])
+def test_a_kind_that_the_firmware_must_have_is_unseen_even_in_a_whole_list(kind):
+    lacking = [n for n in held() if n.startswith((f"COMPASS_{kind}_", f"COMPASS_{kind}2_"))]
+    lacking += [n for n in held() if n.startswith(f"COMPASS_{kind}3_")]
+    assert set(unseen(without(*lacking, whole=True), 2)) == {
+        n for n in acting_on(2) if f"_{kind}" in n
+    }
+
+
 def test_a_log_of_a_few_parameters_does_not_show_a_firmware_without_the_others():
     few = history(dict(vector_parameters("OFS", 1, (30.0, -20.0, 10.0))))
     assert "COMPASS_DIA_X" in unseen(few, 1)
