@@ -18,6 +18,7 @@ from magcomp.fit.flight import (
     estimate_lags,
     is_calibrated,
     near,
+    with_wander,
 )
 from magcomp.fit.folds import folds
 from magcomp.fit.levels import centres_of_flight, fit_levels, usable_levels, with_line
@@ -158,7 +159,7 @@ def _with_lags(problem: Problem, fit: MotorFit) -> MotorFit:
 
 def fit_flight(problem: Problem) -> MotorFit:
     """Fit a flight, opening as many groups of parameters as the data deserve."""
-    found, free = _choose_freedom(problem)
+    found, free = with_wander(problem, *_choose_freedom(problem))
     lags = lags_of(found.parameters)
     samples = problem.sample(lags)
     std = np.sqrt(np.diag(found.covariance))

@@ -16,7 +16,7 @@ off-diagonal of the soft iron, each group with the calibration in force as prior
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -38,6 +38,7 @@ from magcomp.fit.field_model import (
     strength_and_dip,
 )
 from magcomp.fit.robust import ROUNDS, Estimate, Prior, one_step, solve, spread_of, time_blocks
+from magcomp.fit.wander import Posterior, mixed, posterior
 from magcomp.model import (
     CORRECTION_SIZE,
     MOTOR,
@@ -83,6 +84,13 @@ UNPROVEN_OFFSET_MGAUSS, UNPROVEN_SOFT_IRON = 12.0, 0.015
 
 NEVER_CALIBRATED_MGAUSS = 20.0
 """Offsets shorter than this beside an untouched soft iron are what a vehicle is delivered with."""
+
+_BELIEFS = (
+    (4, OPEN_OFFSET_MGAUSS, OPEN_SOFT_IRON),
+    (3, UNPROVEN_OFFSET_MGAUSS, UNPROVEN_SOFT_IRON),
+    (1, TRUSTED_OFFSET_MGAUSS, TRUSTED_SOFT_IRON),
+)
+"""Groups that move, and how far offsets and soft iron of the calibration in force may be off."""
 
 BLOCK_S = 5.0
 
@@ -253,6 +261,51 @@ def near(problem: Problem, free: int, start: FloatArray) -> FloatArray:
     return one_step(
         lambda p: strength_and_dip(samples, p, errors), start, known, spread_of(values, 0.2)
     )
+
+
+def with_wander(problem: Problem, found: FlightEstimate, free: int) -> tuple[FlightEstimate, int]:
+    """The same estimate with what wanders and drifts marginalised, and the groups that moved.
+
+    How far a calibration in force may be off is not known: trusted, ordinary and none are each
+    tried and weighed by how likely they make the data.
+
+    Parameters
+    ----------
+    problem, found
+        The data, and least squares' answer to begin at.
+    free
+        The groups that were open in it; they stand where no marginal solution is possible.
+    """
+
+    def rows(parameters: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        samples = problem.sample(lags_of(parameters))
+        return (samples.time, *strength_and_dip(samples, parameters, found.errors))
+
+    calibrated = is_calibrated(problem.readings.in_force[-1].correction)
+    each: dict[int, Posterior] = {}
+    wander = None
+    for groups, offset, soft_iron in _BELIEFS if calibrated else _BELIEFS[:1]:
+        known = _believed(problem, offset, soft_iron, is_open=groups == len(GROUPS))
+        one = posterior(rows, found.parameters, known, is_physical, wander)
+        if one is not None:
+            each[groups], wander = one, one.wander
+    if not each:
+        return found, free
+    answer = mixed(each.values())
+    likeliest = max(each, key=lambda groups: each[groups].evidence)
+    if not is_physical(answer.parameters):
+        answer = each[likeliest]
+    return replace(found, parameters=answer.parameters, covariance=answer.covariance), max(
+        likeliest, 1
+    ) if likeliest < 3 else len(GROUPS)
+
+
+def _believed(problem: Problem, offset: float, soft_iron: float, *, is_open: bool) -> Prior:
+    """The prior of a calibration that is off by so much, everything open."""
+    known = prior(problem, len(GROUPS) if is_open else 1)
+    width = known.width.copy()
+    width[OFFSET], width[SOFT_IRON] = offset, soft_iron
+    return Prior(known.mean, width)
 
 
 def _with_lags_held(known: Prior) -> Prior:

@@ -124,7 +124,7 @@ def _widened(fit: MotorFit, motors: FloatArray) -> MotorFit:
     count = len(motors)
     jackknife = (count - 1) / count * np.sum((motors - motors.mean(axis=0)) ** 2, axis=0)
     stated = np.maximum(np.diag(fit.covariance)[MOTOR], 1e-18)
-    factor = max(1.0, float(np.mean(jackknife / stated)))
+    factor = max(1.0, float(np.mean(jackknife / stated))) if fit.method != "flight" else 1.0
     scale = np.full(CORRECTION_SIZE, np.sqrt(factor) * UNSEEN)
     if fit.method == "sweep":
         # What a vehicle at rest cannot show does not scatter between its folds either.

@@ -1,0 +1,288 @@
+"""Errors that last: tilt of the attitude that wanders, and offsets of the sensor that drift.
+
+Readings of a minute share them, so a minute says little more than a reading, and least squares
+both answers worse and believes itself more than it should. Here they are states of their own,
+two tilts and three offsets for each short stretch of time, first-order Gauss–Markov processes
+whose sizes are those that make the residuals likeliest. Marginalised, they leave a generalised
+least-squares problem; the precision of the states is a band, so it costs linear time
+(docs/method.md, Flights).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import cho_solve_banded, cholesky_banded
+
+from magcomp.fit.field_model import SIZE, TILT
+from magcomp.fit.robust import Prior
+from magcomp.model import OFFSET, FloatArray, IntArray
+
+STATES = 5
+"""Two tilts and three offsets."""
+
+LEAST_STRETCH_S, MOST_STRETCHES = 1.0, 400
+
+_TILT_DEG = (0.02, 0.05, 0.1, 0.2, 0.35, 0.6, 1.0)
+_TILT_S = (3.0, 10.0, 30.0, 100.0)
+_DRIFT_MGAUSS = (0.2, 0.6, 1.5, 3.0, 6.0, 12.0)
+_DRIFT_S = (20.0, 60.0, 200.0)
+_LOSS_SCALE = 2.5
+_STEPS = 4
+
+
+@dataclass(frozen=True)
+class Wander:
+    """Sizes and times of both processes.
+
+    Attributes
+    ----------
+    tilt_rad, tilt_s
+        Of roll and pitch.
+    drift_mgauss, drift_s
+        Of the offsets.
+    """
+
+    tilt_rad: float = float(np.radians(0.2))
+    tilt_s: float = 10.0
+    drift_mgauss: float = 1.5
+    drift_s: float = 60.0
+
+    def neighbours(self) -> Iterable[Wander]:
+        """The same with one number at each of the values tried."""
+        yield from (replace(self, tilt_rad=float(np.radians(value))) for value in _TILT_DEG)
+        yield from (replace(self, tilt_s=value) for value in _TILT_S)
+        yield from (replace(self, drift_mgauss=value) for value in _DRIFT_MGAUSS)
+        yield from (replace(self, drift_s=value) for value in _DRIFT_S)
+
+
+@dataclass(frozen=True, eq=False)
+class Reduced:
+    """A weighted linear problem with the states taken out of each stretch.
+
+    Attributes
+    ----------
+    time
+        Middle of each stretch, shape (m,).
+    states
+        Information of the states, shape (m, 5, 5).
+    mixed
+        Between the states and the parameters with the residuals as a last column, (m, 5, k + 1).
+    whole
+        Of the parameters and the residuals, shape (m, k + 1, k + 1).
+    """
+
+    time: FloatArray
+    states: FloatArray
+    mixed: FloatArray
+    whole: FloatArray
+
+
+def stretches(time: FloatArray) -> IntArray:
+    """Number of the stretch each reading falls into, shape (n,), without empty ones."""
+    duration = float(time[-1] - time[0])
+    length = max(LEAST_STRETCH_S, duration / MOST_STRETCHES)
+    return np.unique(np.floor((time - time[0]) / length), return_inverse=True)[1]
+
+
+def reduced(
+    time: FloatArray, values: FloatArray, slopes: FloatArray, weights: FloatArray
+) -> Reduced:
+    """Sums over stretches of weighted residuals (n, 2) and their slopes (n, 2, SIZE).
+
+    Parameters
+    ----------
+    time
+        Of each reading, shape (n,).
+    values, slopes
+        Residuals with independent errors, and their derivatives.
+    weights
+        One over the variance of each residual, shape (n, 2).
+    """
+    number = stretches(time)
+    starts = np.flatnonzero(np.r_[True, np.diff(number) != 0])
+    states = np.concatenate([slopes[:, :, TILT], slopes[:, :, OFFSET]], axis=2)
+    columns = np.concatenate([slopes, values[:, :, None]], axis=2)
+    weighted = columns * weights[:, :, None]
+
+    def summed(left: FloatArray, right: FloatArray) -> FloatArray:
+        each = np.matmul(left.transpose(0, 2, 1), right)
+        return np.asarray(np.add.reduceat(each, starts, axis=0))
+
+    count = np.diff(np.r_[starts, len(time)])
+    return Reduced(
+        time=np.add.reduceat(time, starts) / count,
+        states=summed(states * weights[:, :, None], states),
+        mixed=summed(states, weighted),
+        whole=summed(columns, weighted),
+    )
+
+
+def marginal(part: Reduced, wander: Wander) -> tuple[FloatArray, float]:
+    """Information of parameters and residuals without the states, and a log-likelihood.
+
+    Returns
+    -------
+    ndarray, shape (k + 1, k + 1)
+        Last row and column belong to the residuals.
+    float
+        −½ log det of what the states' precision gained: what the likelihood loses to them.
+    """
+    band, prior_log_det = _prior_band(part.time, wander)
+    size = len(part.time) * STATES
+    for row in range(STATES):
+        for column in range(row + 1):
+            band[row - column, column:size:STATES] += part.states[:, row, column]
+    factor = cholesky_banded(band, lower=True)
+    log_det = 2.0 * float(np.sum(np.log(factor[0])))
+    mixed = part.mixed.reshape(size, -1)
+    taken = mixed.T @ cho_solve_banded((factor, True), mixed)
+    return part.whole.sum(axis=0) - taken, -0.5 * (log_det - prior_log_det)
+
+
+def _prior_band(time: FloatArray, wander: Wander) -> tuple[FloatArray, float]:
+    """Lower band of the states' prior precision, shape (6, 5 m), and its log determinant."""
+    count = len(time)
+    band = np.zeros((STATES + 1, count * STATES))
+    log_det = 0.0
+    apart = np.diff(time)
+    kinds = [(wander.tilt_rad, wander.tilt_s)] * 2 + [(wander.drift_mgauss, wander.drift_s)] * 3
+    for state, (size, constant) in enumerate(kinds):
+        kept = np.exp(-apart / constant)
+        news = size**2 * np.maximum(1.0 - kept**2, 1e-9)
+        diagonal = np.zeros(count)
+        diagonal[0] = 1.0 / size**2
+        diagonal[1:] += 1.0 / news
+        diagonal[:-1] += kept**2 / news
+        band[0, state::STATES] = diagonal
+        band[STATES, state : (count - 1) * STATES : STATES] = -kept / news
+        log_det -= 2.0 * np.log(size) + float(np.sum(np.log(news)))
+    return band, log_det
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """What one prior and the data say together.
+
+    Attributes
+    ----------
+    parameters, covariance
+        Shapes (SIZE,) and (SIZE, SIZE).
+    evidence
+        Logarithm, comparable between priors of the same problem.
+    wander
+        The processes it was made with.
+    """
+
+    parameters: FloatArray
+    covariance: FloatArray
+    evidence: float
+    wander: Wander
+
+
+def likeliest(part: Reduced, prior: Prior, at: FloatArray) -> Wander:
+    """The processes that make the residuals likeliest, by coordinates in turn."""
+    best = Wander()
+    score = -np.inf
+    for _ in range(2):
+        before = score
+        for tried in best.neighbours():
+            information, loss = marginal(part, tried)
+            value = _posterior(information, loss, prior, at, tried).evidence
+            if value > score:
+                best, score = tried, value
+        if score - before < 0.5:
+            break
+    return best
+
+
+def _posterior(
+    information: FloatArray, loss: float, prior: Prior, at: FloatArray, wander: Wander
+) -> Posterior:
+    """One Gauss–Newton step from ``at`` with a Gaussian prior."""
+    moving = prior.width > 0.0
+    precision = prior.precision[moving]
+    away = (at - prior.mean)[moving]
+    matrix = information[:-1, :-1][np.ix_(moving, moving)] + np.diag(precision)
+    gradient = information[:-1, -1][moving] + precision * away
+    covariance = np.linalg.pinv(matrix, hermitian=True)
+    step = -covariance @ gradient
+    square = float(information[-1, -1] + away @ (precision * away) + gradient @ step)
+    log_det = float(np.linalg.slogdet(matrix)[1])
+    prior_log_det = float(np.sum(np.log(precision[precision > 0.0])))
+    parameters = at.copy()
+    parameters[moving] += step
+    whole = np.zeros((len(at), len(at)))
+    whole[np.ix_(moving, moving)] = covariance
+    evidence = loss - 0.5 * (square + log_det - prior_log_det)
+    return Posterior(parameters, whole, evidence, wander)
+
+
+Rows = Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
+"""Parameters → time (n,), residuals (n, 2) with independent errors, slopes (n, 2, SIZE)."""
+
+
+def posterior(
+    rows: Rows,
+    start: FloatArray,
+    prior: Prior,
+    feasible: Callable[[FloatArray], bool],
+    wander: Wander | None = None,
+) -> Posterior | None:
+    """The parameters with both processes marginalised; None where the steps run away.
+
+    Parameters
+    ----------
+    rows
+        The model.
+    start
+        Near the solution, shape (SIZE,).
+    prior
+        Means and widths.
+    feasible
+        Whether parameters are possible.
+    wander
+        The processes where known; the likeliest at ``start`` otherwise.
+    """
+    at, found = start, None
+    for _ in range(_STEPS):
+        time, values, slopes = rows(at)
+        part = reduced(time, values, slopes, _weights(time, values))
+        if wander is None:
+            wander = likeliest(part, prior, at)
+        found = _posterior(*marginal(part, wander), prior, at, wander)
+        if not np.all(np.isfinite(found.parameters)) or not feasible(found.parameters):
+            return None
+        at = found.parameters
+    return found
+
+
+def _weights(time: FloatArray, values: FloatArray) -> FloatArray:
+    """One over the variance of each residual: white noise from neighbours, outliers less."""
+    close = np.diff(time) < 2.0
+    steps = np.abs(np.diff(values, axis=0)[close]) if close.any() else np.abs(values)
+    white = np.maximum(1.4826 * np.median(steps, axis=0) / np.sqrt(2.0), 0.2)
+    centre = np.stack([_running_median(column) for column in values.T], axis=1)
+    far = (values - centre) / white
+    return np.asarray(1.0 / np.sqrt(1.0 + (far / _LOSS_SCALE) ** 2) / white**2)
+
+
+def _running_median(values: FloatArray, half: int = 7) -> FloatArray:
+    padded = np.pad(values, half, mode="edge")
+    return np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1), axis=1)
+
+
+def mixed(found: Iterable[Posterior]) -> Posterior:
+    """Several posteriors of the same data, each weighed by its evidence."""
+    each = tuple(found)
+    best = max(each, key=lambda one: one.evidence)
+    weights = np.array([np.exp(one.evidence - best.evidence) for one in each])
+    weights /= weights.sum()
+    mean = np.sum([w * one.parameters for w, one in zip(weights, each, strict=True)], axis=0)
+    covariance = np.zeros((SIZE, SIZE))
+    for weight, one in zip(weights, each, strict=True):
+        apart = one.parameters - mean
+        covariance += weight * (one.covariance + np.outer(apart, apart))
+    return Posterior(mean, covariance, best.evidence, best.wander)
