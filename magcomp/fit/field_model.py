@@ -47,10 +47,19 @@ def strength_and_dip(
     taken along the field (strength) and across it (dip). Slopes are those of the model's field,
     not of the noisy reading, so noise is not taken for soft iron (errors in variables).
     """
+    return rows_of(samples, parameters, noise)[:2]
+
+
+def rows_of(
+    samples: Samples, parameters: FloatArray, noise: Noise | None
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """As :func:`strength_and_dip`, with the change of both residuals by one unit of u, (n, 2)."""
     values, slopes, pulls = _rows(samples, parameters)
     if noise is None:
-        return values, slopes
-    return whitened(values, pulls, noise), whitened(slopes, pulls, noise)
+        return values, slopes, pulls
+    together = np.concatenate([values[:, :, None], pulls[:, :, None], slopes], axis=2)
+    made = whitened(together, pulls, noise)
+    return made[:, :, 0], made[:, :, 2:], made[:, :, 1]
 
 
 def _rows(samples: Samples, parameters: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -35,10 +35,11 @@ from magcomp.fit.field_model import (
     TILT,
     errors_of,
     lags_of,
+    rows_of,
     strength_and_dip,
 )
 from magcomp.fit.robust import ROUNDS, Estimate, Prior, one_step, solve, spread_of, time_blocks
-from magcomp.fit.wander import Posterior, mixed, posterior
+from magcomp.fit.wander import Posterior, Rows, mixed, posterior
 from magcomp.model import (
     CORRECTION_SIZE,
     MOTOR,
@@ -277,9 +278,10 @@ def with_wander(problem: Problem, found: FlightEstimate, free: int) -> tuple[Fli
         The groups that were open in it; they stand where no marginal solution is possible.
     """
 
-    def rows(parameters: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def rows(parameters: FloatArray) -> Rows:
         samples = problem.sample(lags_of(parameters))
-        return (samples.time, *strength_and_dip(samples, parameters, found.errors))
+        values, slopes, pulls = rows_of(samples, parameters, found.errors)
+        return Rows(samples.time, values, slopes, pulls * float(np.std(samples.u)))
 
     calibrated = is_calibrated(problem.readings.in_force[-1].correction)
     each: dict[int, Posterior] = {}
@@ -287,6 +289,9 @@ def with_wander(problem: Problem, found: FlightEstimate, free: int) -> tuple[Fli
     for groups, offset, soft_iron in _BELIEFS if calibrated else _BELIEFS[:1]:
         known = _believed(problem, offset, soft_iron, is_open=groups == len(GROUPS))
         one = posterior(rows, found.parameters, known, is_physical, wander)
+        if one is not None and not one.wander.shows:
+            # Least squares is less sensitive to a current that is wrong for seconds.
+            return found, free
         if one is not None:
             each[groups], wander = one, one.wander
     if not each:

@@ -1,11 +1,11 @@
-"""Errors that last: tilt of the attitude that wanders, and offsets of the sensor that drift.
+"""Errors that last: tilt that wanders, offsets that drift, a current that is off for a while.
 
 Readings of a minute share them, so a minute says little more than a reading, and least squares
-both answers worse and believes itself more than it should. Here they are states of their own,
-two tilts and three offsets for each short stretch of time, first-order Gauss–Markov processes
-whose sizes are those that make the residuals likeliest. Marginalised, they leave a generalised
-least-squares problem; the precision of the states is a band, so it costs linear time
-(docs/method.md, Flights).
+both answers worse and believes itself more than it should. Here they are states of their own, two
+tilts, three offsets and an error of the control quantity for each short stretch of time,
+first-order Gauss–Markov processes whose sizes are those that make the residuals likeliest.
+Marginalised, they leave a generalised least-squares problem; the precision of the states is a
+band, so it costs linear time (docs/method.md, Flights).
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from magcomp.fit.field_model import SIZE, TILT
 from magcomp.fit.robust import Prior
 from magcomp.model import OFFSET, FloatArray, IntArray
 
-STATES = 5
-"""Two tilts and three offsets."""
+STATES = 6
+"""Two tilts, three offsets, and the control quantity."""
 
 LEAST_STRETCH_S, MOST_STRETCHES = 1.0, 400
 
@@ -29,13 +29,16 @@ _TILT_DEG = (0.02, 0.05, 0.1, 0.2, 0.35, 0.6, 1.0)
 _TILT_S = (3.0, 10.0, 30.0, 100.0)
 _DRIFT_MGAUSS = (0.2, 0.6, 1.5, 3.0, 6.0, 12.0)
 _DRIFT_S = (20.0, 60.0, 200.0)
+_CONTROL_SHARE = (0.001, 0.01, 0.03, 0.08, 0.15)
+_CONTROL_S = (1.0, 3.0, 10.0, 40.0)
+_LEAST_TILT_RAD, _LEAST_DRIFT_MGAUSS = np.radians(0.12), 0.7
 _LOSS_SCALE = 2.5
 _STEPS = 4
 
 
 @dataclass(frozen=True)
 class Wander:
-    """Sizes and times of both processes.
+    """Sizes and times of the processes.
 
     Attributes
     ----------
@@ -43,15 +46,26 @@ class Wander:
         Of roll and pitch.
     drift_mgauss, drift_s
         Of the offsets.
+    control_share, control_s
+        Of the control quantity, as a share of its spread.
     """
 
-    tilt_rad: float = float(np.radians(0.2))
+    tilt_rad: float = float(np.radians(0.05))
     tilt_s: float = 10.0
-    drift_mgauss: float = 1.5
+    drift_mgauss: float = 0.6
     drift_s: float = 60.0
+    control_share: float = 0.01
+    control_s: float = 3.0
+
+    @property
+    def shows(self) -> bool:
+        """Whether there is any to speak of."""
+        return self.tilt_rad > _LEAST_TILT_RAD or self.drift_mgauss > _LEAST_DRIFT_MGAUSS
 
     def neighbours(self) -> Iterable[Wander]:
         """The same with one number at each of the values tried."""
+        yield from (replace(self, control_share=value) for value in _CONTROL_SHARE)
+        yield from (replace(self, control_s=value) for value in _CONTROL_S)
         yield from (replace(self, tilt_rad=float(np.radians(value))) for value in _TILT_DEG)
         yield from (replace(self, tilt_s=value) for value in _TILT_S)
         yield from (replace(self, drift_mgauss=value) for value in _DRIFT_MGAUSS)
@@ -67,9 +81,9 @@ class Reduced:
     time
         Middle of each stretch, shape (m,).
     states
-        Information of the states, shape (m, 5, 5).
+        Information of the states, shape (m, 6, 6).
     mixed
-        Between the states and the parameters with the residuals as a last column, (m, 5, k + 1).
+        Between the states and the parameters with the residuals as a last column, (m, 6, k + 1).
     whole
         Of the parameters and the residuals, shape (m, k + 1, k + 1).
     """
@@ -87,23 +101,42 @@ def stretches(time: FloatArray) -> IntArray:
     return np.unique(np.floor((time - time[0]) / length), return_inverse=True)[1]
 
 
-def reduced(
-    time: FloatArray, values: FloatArray, slopes: FloatArray, weights: FloatArray
-) -> Reduced:
-    """Sums over stretches of weighted residuals (n, 2) and their slopes (n, 2, SIZE).
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Readings at some parameters.
 
-    Parameters
+    Attributes
     ----------
     time
         Of each reading, shape (n,).
     values, slopes
-        Residuals with independent errors, and their derivatives.
+        Residuals with independent errors, shape (n, 2), and their derivatives, (n, 2, SIZE).
+    pulls
+        What one standard deviation of the control quantity adds to them, shape (n, 2).
+    """
+
+    time: FloatArray
+    values: FloatArray
+    slopes: FloatArray
+    pulls: FloatArray
+
+
+def reduced(rows: Rows, weights: FloatArray) -> Reduced:
+    """Sums over stretches of weighted residuals and their slopes.
+
+    Parameters
+    ----------
+    rows
+        The readings.
     weights
         One over the variance of each residual, shape (n, 2).
     """
+    time, values, slopes = rows.time, rows.values, rows.slopes
     number = stretches(time)
     starts = np.flatnonzero(np.r_[True, np.diff(number) != 0])
-    states = np.concatenate([slopes[:, :, TILT], slopes[:, :, OFFSET]], axis=2)
+    states = np.concatenate(
+        [slopes[:, :, TILT], slopes[:, :, OFFSET], rows.pulls[:, :, None]], axis=2
+    )
     columns = np.concatenate([slopes, values[:, :, None]], axis=2)
     weighted = columns * weights[:, :, None]
 
@@ -143,12 +176,13 @@ def marginal(part: Reduced, wander: Wander) -> tuple[FloatArray, float]:
 
 
 def _prior_band(time: FloatArray, wander: Wander) -> tuple[FloatArray, float]:
-    """Lower band of the states' prior precision, shape (6, 5 m), and its log determinant."""
+    """Lower band of the states' prior precision, shape (7, 6 m), and its log determinant."""
     count = len(time)
     band = np.zeros((STATES + 1, count * STATES))
     log_det = 0.0
     apart = np.diff(time)
     kinds = [(wander.tilt_rad, wander.tilt_s)] * 2 + [(wander.drift_mgauss, wander.drift_s)] * 3
+    kinds += [(wander.control_share, wander.control_s)]
     for state, (size, constant) in enumerate(kinds):
         kept = np.exp(-apart / constant)
         news = size**2 * np.maximum(1.0 - kept**2, 1e-9)
@@ -186,7 +220,7 @@ def likeliest(part: Reduced, prior: Prior, at: FloatArray) -> Wander:
     """The processes that make the residuals likeliest, by coordinates in turn."""
     best = Wander()
     score = -np.inf
-    for _ in range(2):
+    for _ in range(4):
         before = score
         for tried in best.neighbours():
             information, loss = marginal(part, tried)
@@ -220,12 +254,8 @@ def _posterior(
     return Posterior(parameters, whole, evidence, wander)
 
 
-Rows = Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
-"""Parameters → time (n,), residuals (n, 2) with independent errors, slopes (n, 2, SIZE)."""
-
-
 def posterior(
-    rows: Rows,
+    rows_at: Callable[[FloatArray], Rows],
     start: FloatArray,
     prior: Prior,
     feasible: Callable[[FloatArray], bool],
@@ -235,8 +265,8 @@ def posterior(
 
     Parameters
     ----------
-    rows
-        The model.
+    rows_at
+        The model: parameters, shape (SIZE,), to readings.
     start
         Near the solution, shape (SIZE,).
     prior
@@ -248,8 +278,8 @@ def posterior(
     """
     at, found = start, None
     for _ in range(_STEPS):
-        time, values, slopes = rows(at)
-        part = reduced(time, values, slopes, _weights(time, values))
+        rows = rows_at(at)
+        part = reduced(rows, _weights(rows.time, rows.values))
         if wander is None:
             wander = likeliest(part, prior, at)
         found = _posterior(*marginal(part, wander), prior, at, wander)
