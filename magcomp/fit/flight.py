@@ -87,11 +87,15 @@ NEVER_CALIBRATED_MGAUSS = 20.0
 """Offsets shorter than this beside an untouched soft iron are what a vehicle is delivered with."""
 
 _BELIEFS = (
-    (4, OPEN_OFFSET_MGAUSS, OPEN_SOFT_IRON),
-    (3, UNPROVEN_OFFSET_MGAUSS, UNPROVEN_SOFT_IRON),
-    (1, TRUSTED_OFFSET_MGAUSS, TRUSTED_SOFT_IRON),
+    (4, OPEN_OFFSET_MGAUSS, OPEN_SOFT_IRON, 1.0),
+    (3, UNPROVEN_OFFSET_MGAUSS, UNPROVEN_SOFT_IRON, 1.0),
+    (1, TRUSTED_OFFSET_MGAUSS, TRUSTED_SOFT_IRON, 0.25),
 )
-"""Groups that move, and how far offsets and soft iron of the calibration in force may be off."""
+"""Groups that move, how far offsets and soft iron of the calibration in force may be off, and how
+often that is so: a calibration as good as the last is rare, and data that say little favour it."""
+
+_SIZES_UNKNOWN = 1.16
+"""Standard errors are wider by this, for the sizes of what wanders are themselves estimates."""
 
 BLOCK_S = 5.0
 
@@ -286,14 +290,15 @@ def with_wander(problem: Problem, found: FlightEstimate, free: int) -> tuple[Fli
     calibrated = is_calibrated(problem.readings.in_force[-1].correction)
     each: dict[int, Posterior] = {}
     wander = None
-    for groups, offset, soft_iron in _BELIEFS if calibrated else _BELIEFS[:1]:
+    for groups, offset, soft_iron, share in _BELIEFS if calibrated else _BELIEFS[:1]:
         known = _believed(problem, offset, soft_iron, is_open=groups == len(GROUPS))
         one = posterior(rows, found.parameters, known, is_physical, wander)
         if one is not None and not one.wander.shows:
             # Least squares is less sensitive to a current that is wrong for seconds.
             return found, free
         if one is not None:
-            each[groups], wander = one, one.wander
+            each[groups] = replace(one, evidence=one.evidence + float(np.log(share)))
+            wander = one.wander
     if not each:
         return found, free
     answer = mixed(each.values())
