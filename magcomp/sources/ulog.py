@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import calendar
+import math
 import re
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,7 @@ _MAGIC = b"ULog\x01\x12\x35"
 _AUTOPILOT = "px4"
 _SYSTEM_NAMES = ("MAV_SYS_ID", "MAV_COMP_ID", "MAV_TYPE")
 _ROTARY = 1
+_ATTITUDE = "vehicle_attitude"
 
 _TOPICS = (
     "actuator_armed",
@@ -29,12 +31,13 @@ _TOPICS = (
     "actuator_motors",
     "actuator_outputs",
     "battery_status",
+    "esc_status",
     "sensor_combined",
     "sensor_gps",
     "sensor_mag",
     "vehicle_acceleration",
     "vehicle_angular_velocity",
-    "vehicle_attitude",
+    _ATTITUDE,
     "vehicle_global_position",
     "vehicle_gps_position",
     "vehicle_magnetometer",
@@ -84,12 +87,13 @@ def read_ulog(path: str | Path) -> Recording:
     last = max(int(topic.columns["timestamp"][-1]) for topic in log.topics.values())
     parameters = _parameters(log, zero)
     values = parameters.latest
-    version = firmware_version(int(log.info.get("ver_sw_release", 0)))
+    version = firmware_version(log.number("ver_sw_release"))
     quantities = Quantities(log, zero, version, values)
     armed = quantities.armed()
     compasses = Compasses(log, zero, parameters, armed).fields()
     batteries = quantities.currents()
     battery = quantities.battery(batteries)
+    attitude = quantities.attitude()
     return Recording(
         source=str(path),
         vehicle=_vehicle(log, values, version),
@@ -100,7 +104,8 @@ def read_ulog(path: str | Path) -> Recording:
         report=ReadReport(
             size=len(octets), frames=sum(map(len, log.topics.values())), used=quantities.rows()
         ),
-        attitude=quantities.attitude(),
+        attitude=attitude,
+        attitude_source="" if attitude is None else _ATTITUDE,
         gyro=quantities.gyro(),
         accel=quantities.accel(),
         throttle=quantities.throttle(),
@@ -111,6 +116,7 @@ def read_ulog(path: str | Path) -> Recording:
         armed=armed,
         format="ulog",
         battery=battery,
+        esc_current=quantities.esc_current(),
         other_currents={n: each for n, each in batteries.items() if n != battery},
         raw_compasses=frozenset(n for n, each in compasses.items() if each.raw),
     )
@@ -127,7 +133,7 @@ def _parameters(log: UlogFile, zero: int) -> ParameterHistory:
 
 
 def _vehicle(log: UlogFile, values: dict[str, float], version: str) -> Vehicle:
-    system, component, kind = (int(values.get(name, 0.0)) for name in _SYSTEM_NAMES)
+    system, component, kind = (_whole(values.get(name, 0.0)) for name in _SYSTEM_NAMES)
     status = log.topic("vehicle_status", "vehicle_type")
     if KINDS.get(kind, "unknown") == "unknown" and status is not None:
         rotary = bool(np.median(status.number("vehicle_type")) == _ROTARY)
@@ -146,6 +152,10 @@ def _vehicle(log: UlogFile, values: dict[str, float], version: str) -> Vehicle:
     )
 
 
+def _whole(value: float) -> int:
+    return int(value) if math.isfinite(value) else 0
+
+
 def _uid(text: str) -> str:
     try:
         return unique_id(bytes.fromhex(text), 0)
@@ -159,7 +169,14 @@ def _start(log: UlogFile, by_satellite: float, zero: int) -> float:
         return by_satellite
     for message in log.messages:
         if date := _NAMED_BY_DATE.search(message):
-            start = calendar.timegm(tuple(int(part) for part in date.groups()))
-            return float(start) if start > _EARLIEST_UNIX_S else float("nan")
-    booted = log.info.get("boot_time_utc_us", 0)
+            return _unix_s(*(int(part) for part in date.groups()))
+    booted = log.number("boot_time_utc_us")
     return (booted + zero) * MICROSECOND if booted else float("nan")
+
+
+def _unix_s(year: int, month: int, day: int, hour: int, minute: int, second: int) -> float:
+    try:
+        start = datetime(year, month, day, hour, minute, second, tzinfo=UTC).timestamp()
+    except ValueError:
+        return float("nan")
+    return start if start > _EARLIEST_UNIX_S else float("nan")

@@ -18,6 +18,9 @@ from magcomp.sources.ulog_file import Topic, UlogFile
 _OFTEN = 1.5
 """The corrected field is taken where it comes so much more often than the sensor's own."""
 
+_MOST_GAUSS = 50.0
+"""No compass measures as much."""
+
 _LEAST_COMMON = 20
 _ALIKE_MGAUSS = 2.5
 _GAP_S = 1.5
@@ -115,8 +118,10 @@ class Compasses:
         rows: dict[int, list[tuple[FloatArray, FloatArray]]] = {}
         for topic, value in tables:
             time = topic.measured(self.zero)
-            sound = np.isfinite(value).all(axis=1) & (value != 0.0).any(axis=1)
-            devices = topic.columns.get("device_id", np.zeros(len(time)))
+            # NaN fails.
+            sound = (np.abs(value) < _MOST_GAUSS).all(axis=1) & (value != 0.0).any(axis=1)
+            devices = topic.number("device_id") if "device_id" in topic else np.zeros(len(time))
+            sound &= np.isfinite(devices)
             for device in np.unique(devices[sound]).tolist():
                 mine = sound & (devices == device)
                 rows.setdefault(int(device), []).append((time[mine], value[mine]))

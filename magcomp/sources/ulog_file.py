@@ -112,6 +112,11 @@ class UlogFile:
     messages: tuple[str, ...]
     start: int
 
+    def number(self, name: str) -> int:
+        """A fact that is a whole number; 0 where it is not told, or is none."""
+        value = self.info.get(name, 0)
+        return value if isinstance(value, int) and value >= 0 else 0
+
     def topic(self, name: str, *fields: str, instance: int = 0) -> Topic | None:
         """A topic's instance, if it came with these fields."""
         found = self.topics.get((name, instance))
@@ -253,7 +258,10 @@ def _start(log: Any, parts: Mapping[tuple[str, int], list[Columns]]) -> int:
     stamps = [each["timestamp"] for tables in parts.values() for each in tables]
     if not stamps:
         return int(log.start_timestamp)
-    every = np.concatenate(stamps).astype(np.float64)
+    every = np.concatenate([stamp.astype(np.float64) for stamp in stamps])
+    every = every[np.isfinite(every)]
+    if not len(every):
+        return 0
     middle = float(np.median(every))
     said = float(log.start_timestamp)
     if middle - _DAY_US < said <= middle:

@@ -13,10 +13,13 @@ from magcomp.model import BoolArray, FloatArray, Series
 from magcomp.sources.ulog_file import MICROSECOND, Topic, UlogFile
 
 _NO_SENSOR = -1.0
+_MOST_OF_A_BATTERY = 10_000.0
+"""Amperes and volts that no battery has."""
 _ARMED = 2
 _FIX_3D = 3
 _OUTPUTS = 16
 _MOTORS = 12
+_ESCS = 8
 _THRUST_TOPIC_ALONE = (1, 14)
 """From here on P is the length of the thrust setpoint; before it was control 3."""
 
@@ -101,7 +104,8 @@ class Quantities:
         found = {}
         for instance, topic in self.log.instances("battery_status", "current_a").items():
             value = topic.number("current_a")
-            series = _series(self._said(topic), value, value != _NO_SENSOR)
+            sound = (value != _NO_SENSOR) & (np.abs(value) < _MOST_OF_A_BATTERY)
+            series = _series(self._said(topic), value, sound)
             if series is not None and series.value.any():
                 found[instance] = series
         return found
@@ -112,10 +116,24 @@ class Quantities:
         first, second = (1, 0) if switched else (0, 1)
         return second if first not in currents and second in currents else first
 
+    def esc_current(self) -> Series | None:
+        """Sum of the speed controllers' currents in A, where any reports one."""
+        topic = self.log.topic("esc_status")
+        names = [f"esc[{number}].esc_current" for number in range(_ESCS)]
+        told = [] if topic is None else [name for name in names if name in topic]
+        if topic is None or not told:
+            return None
+        total = np.sum([topic.number(name) for name in told], axis=0)
+        found = _series(self._said(topic), total, np.abs(total) < _MOST_OF_A_BATTERY)
+        return found if found is not None and found.value.any() else None
+
     def voltage(self, battery: int) -> Series | None:
         """Volts of a battery instance."""
         topic = self.log.topic("battery_status", "voltage_v", instance=battery)
-        return None if topic is None else _series(self._said(topic), topic.number("voltage_v"))
+        if topic is None:
+            return None
+        value = topic.number("voltage_v")
+        return _series(self._said(topic), value, np.abs(value) < _MOST_OF_A_BATTERY)
 
     def outputs(self) -> Series | None:
         """Motor outputs in microseconds, shape (n, 16); 0 where none is driven."""

@@ -89,7 +89,7 @@ BAD: list[tuple[Callable[[Path], None], str]] = [
     (no_attitude, "attitude"),
     (nan_parameters, "COMPASS_OFS_X must be a finite number"),
     (two_vehicles, "--system"),
-    (px4, "ArduPilot"),
+    (px4, "must tell the vehicle's CAL_MAG_COMP_TYP"),
 ]
 
 
@@ -184,7 +184,7 @@ def test_a_log_without_parameters_is_no_ground_to_write_anything(
         (("frobnicate",), "frobnicate"),
         (("fit",), "LOG"),
         (("fit", "x.tlog", "--frobnicate"), "--frobnicate"),
-        (("fit", "x.tlog", "--compass", "4"), "4"),
+        (("fit", "x.tlog", "--compass", "5"), "5"),
         (("fit", "x.tlog", "--method", "magic"), "magic"),
         (("fit", "x.tlog", "--start", "soon"), "soon"),
         (("fit", "x.tlog", "--start", "5", "--end", "5"), "5.0"),

@@ -143,6 +143,15 @@ def test_a_battery_without_a_current_sensor_has_no_current(recorded, absent: flo
     assert found.voltage is not None
 
 
+def test_the_speed_controllers_currents_are_summed(recorded) -> None:
+    writer = short_flight(1)
+    for n in range(5):
+        writer.row("esc_status", n / 10, 0, 3.0 + n, 0, 4.0)
+    found = recorded(writer)
+    assert found.esc_current.value.tolist() == [7.0, 8.0, 9.0, 10.0, 11.0]
+    assert found.attitude_source == "vehicle_attitude"
+
+
 def batteries(switch: int) -> Writer:
     writer = Writer(parameters={"CAL_MAG_COMP_TYP": switch})
     for n in range(20):
@@ -295,6 +304,41 @@ changes = st.lists(
     min_size=1,
     max_size=12,
 )
+
+
+LIES = [
+    ("uint64_t", "float[2]"),
+    ("uint64_t", "float"),
+    ("uint32_t device_id", "float device_id"),
+    ("float x", "char[4] x"),
+    ("float ", "double "),
+    ("float", "nothing"),
+    ("timestamp;", "timestimp;"),
+    ("uint64_t timestamp_sample", "double timestamp"),
+    ("float[4] q", "float[65000] q"),
+    ("float[4] q", "vehicle_attitude[4] q"),
+]
+
+
+@given(
+    lies=st.lists(st.sampled_from(LIES), min_size=1, max_size=3),
+    release=st.sampled_from([b"uint32_t ver_sw_release", b"char[4] ver_sw_release", b"\xff"]),
+    date=st.sampled_from(["2024-03-01/06_46_06", "2024-99-01/06_46_06", "0000-03-01/99_99_99"]),
+    kind=st.sampled_from([2, float("nan"), float("inf"), -1.5]),
+)
+@settings(max_examples=80, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_a_log_that_lies_about_what_it_holds_raises_what_is_ours(
+    tmp_path: Path, lies, release, date, kind
+) -> None:
+    writer = short_flight(1)
+    writer.said(f"[logger] /fs/microsd/log/{date}.ulg\t")
+    writer.parameters["MAV_TYPE"] = kind
+    forms = dict(FORMS)
+    for true, lie in lies:
+        forms = {name: form.replace(true, lie) for name, form in forms.items()}
+    writer.forms = forms
+    body = bytes([len(release)]) + release + struct.pack("<I", 0x010F02FF)
+    survives(tmp_path / "lies.ulg", writer.binary() + message("I", body))
 
 
 def changed(data: bytes, edits: list[tuple[str, int, int]]) -> bytes:

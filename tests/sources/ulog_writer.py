@@ -32,6 +32,8 @@ FORMS: Mapping[str, str] = {
     "actuator_controls_0": "uint64_t timestamp;float[8] control;",
     "actuator_motors": "uint64_t timestamp;float[12] control;",
     "actuator_outputs": "uint64_t timestamp;uint32_t noutputs;float[16] output;",
+    "esc_report": "uint64_t timestamp;float esc_current;",
+    "esc_status": "uint64_t timestamp;esc_report[2] esc;",
     "vehicle_status": "uint64_t timestamp;uint8_t arming_state;uint8_t vehicle_type;",
     "vehicle_global_position": "uint64_t timestamp;double lat;double lon;float alt;",
     "vehicle_gps_position": "uint64_t timestamp;uint64_t time_utc_usec;int32_t lat;int32_t lon;"
@@ -49,6 +51,10 @@ def code_of(form: str) -> str:
         base, _, count = each.split(" ")[0].partition("[")
         found += (count.rstrip("]") or "") + _CODES[base]
     return found
+
+
+ESC_STATUS = "<QQfQf"
+"""A format inside another, laid out."""
 
 
 def parameter(name: str, value: float) -> bytes:
@@ -77,7 +83,8 @@ class Writer:
             self.raw(message("A", struct.pack("<BH", instance, number) + name.encode()))
         stamped = [round(value * 1e6) + START_US if n == 0 else value for n, value in
                    enumerate(values)]  # fmt: skip
-        body = struct.pack(code_of(self.forms[name]), *stamped)
+        code = ESC_STATUS if name == "esc_status" else code_of(self.forms[name])
+        body = struct.pack(code, *stamped)
         self.raw(message("D", struct.pack("<H", self._topics[name, instance]) + body))
 
     def set(self, name: str, value: float) -> None:
