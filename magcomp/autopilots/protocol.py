@@ -202,6 +202,11 @@ class Autopilot(Protocol):
         ...
 
     @property
+    def storage_s(self) -> float:
+        """Seconds after which a write survives a restart."""
+        ...
+
+    @property
     def device_ids_describe(self) -> str:
         """What a device id says, in words, where it does not tell one vehicle from its twin."""
         ...

@@ -8,19 +8,16 @@ from dataclasses import replace
 import numpy as np
 
 from magcomp.errors import FitRejectedError, MissingDataError, UsageError
+from magcomp.fit.field_model import FIELD_LAG, REGRESSOR_LAG, SIZE, STRENGTH, lags_of, vertical_of
 from magcomp.fit.flight import (
-    FIELD_LAG,
     GROUPS,
-    REGRESSOR_LAG,
-    SIZE,
-    STRENGTH,
+    FlightEstimate,
     Problem,
     correction_of,
     estimate,
     estimate_lags,
     is_calibrated,
-    lags_of,
-    vertical_of,
+    near,
 )
 from magcomp.fit.folds import folds
 from magcomp.fit.levels import centres_of_flight, fit_levels, usable_levels, with_line
@@ -36,6 +33,7 @@ from magcomp.model import (
     MotorFit,
     Readings,
     pack,
+    unpack,
 )
 
 METHODS = ("auto", "sweep", "levels", "flight")
@@ -148,8 +146,7 @@ def refit(problem: Problem, fit: MotorFit, keep: BoolArray) -> MotorFit:
             np.zeros(SIZE - CORRECTION_SIZE - 4),
         ]
     )
-    found = estimate(part, _groups(fit), start=start, hold_lags=True, with_covariance=False)
-    return _updated(fit, found)
+    return _updated(fit, near(part, _groups(fit), start))
 
 
 def _with_lags(problem: Problem, fit: MotorFit) -> MotorFit:
@@ -190,7 +187,7 @@ def fit_flight(problem: Problem) -> MotorFit:
     return with_line(bare, centres)
 
 
-def _choose_freedom(problem: Problem) -> tuple[Estimate, int]:
+def _choose_freedom(problem: Problem) -> tuple[FlightEstimate, int]:
     """The least open fit that explains the field nearly as well as the most open admissible one.
 
     Admissible is what the data determine: see :func:`is_determined`. Candidates are compared at
@@ -206,6 +203,7 @@ def _choose_freedom(problem: Problem) -> tuple[Estimate, int]:
             free,
             start=opened.parameters,
             hold_lags=True,
+            errors=opened.errors,
             with_covariance=False,
             rounds=_QUICK,
         )
@@ -215,11 +213,11 @@ def _choose_freedom(problem: Problem) -> tuple[Estimate, int]:
             and ratio < CLEAR
             and not _pays_on_unseen(problem, (tried, free), (opened, most))
         ):
-            return estimate(problem, free, start=tried.parameters), free
+            return estimate(problem, free, start=tried.parameters, errors=opened.errors), free
     return opened, most
 
 
-def _most_open(problem: Problem) -> tuple[int, Estimate]:
+def _most_open(problem: Problem) -> tuple[int, FlightEstimate]:
     """The most open fit whose parameters the data determine.
 
     With motors alone where they determine no more, unless the data contradict the calibration in
@@ -255,7 +253,7 @@ def _typical(noise: FloatArray) -> float:
 
 
 def _pays_on_unseen(
-    problem: Problem, closed: tuple[Estimate, int], opened: tuple[Estimate, int]
+    problem: Problem, closed: tuple[FlightEstimate, int], opened: tuple[FlightEstimate, int]
 ) -> bool:
     """Whether the open fit also predicts held-out readings better."""
     fold = folds(problem.readings.time)
@@ -269,6 +267,7 @@ def _pays_on_unseen(
                 free,
                 start=found.parameters,
                 hold_lags=True,
+                errors=found.errors,
                 with_covariance=False,
             )
             unseen = problem.where(fold == index).sample(lags)
@@ -295,12 +294,12 @@ def _groups(fit: MotorFit) -> int:
     return sum(1 for group in GROUPS if group in fit.free)
 
 
-def _updated(fit: MotorFit, found: Estimate) -> MotorFit:
+def _updated(fit: MotorFit, parameters: FloatArray) -> MotorFit:
     return replace(
         fit,
-        correction=correction_of(found),
-        strength=float(found.parameters[STRENGTH]),
-        vertical=vertical_of(found.parameters),
+        correction=unpack(parameters[:CORRECTION_SIZE]),
+        strength=float(parameters[STRENGTH]),
+        vertical=vertical_of(parameters),
     )
 
 

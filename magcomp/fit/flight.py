@@ -21,9 +21,23 @@ from dataclasses import dataclass
 import numpy as np
 
 from magcomp.align import sample, within
-from magcomp.align.low_pass import low_pass
 from magcomp.earth import EarthField
-from magcomp.fit.robust import ROUNDS, Estimate, Prior, solve, time_blocks
+from magcomp.fit.control_noise import Noise
+from magcomp.fit.field_model import (
+    DIAGONAL,
+    FIELD_LAG,
+    LEAN,
+    OFF_DIAGONAL,
+    REGRESSOR_LAG,
+    SIN_DIP,
+    SIZE,
+    STRENGTH,
+    TILT,
+    errors_of,
+    lags_of,
+    strength_and_dip,
+)
+from magcomp.fit.robust import ROUNDS, Estimate, Prior, one_step, solve, spread_of, time_blocks
 from magcomp.model import (
     CORRECTION_SIZE,
     MOTOR,
@@ -42,18 +56,11 @@ from magcomp.model import (
     unpack,
 )
 
-STRENGTH, SIN_DIP, FIELD_LAG, REGRESSOR_LAG = range(CORRECTION_SIZE, CORRECTION_SIZE + 4)
-TILT, LEAN = (
-    slice(CORRECTION_SIZE + 4, CORRECTION_SIZE + 6),
-    slice(CORRECTION_SIZE + 6, CORRECTION_SIZE + 8),
-)
-SIZE = CORRECTION_SIZE + 8
-
 TILT_WIDTH_RAD = np.radians(0.5)
 """Autopilots level their attitude to about this: constant errors of roll and of pitch."""
 
-LEAN_WIDTH, LEAN_S = 0.1, 4.0
-"""Radians of attitude error a radian of lean held for seconds, and how soon it comes."""
+LEAN_WIDTH = 0.1
+"""Radians of attitude error a radian of lean held for seconds."""
 
 LAG_MEAN_S, LAG_WIDTH_S, LAG_MOST_S = 0.08, 0.1, 0.6
 """AUTOPILOTS.md, Timing: the field lags by 0.05–0.1 s, the current by something of that order."""
@@ -85,7 +92,6 @@ DRIFT_S = 30.0
 _LEAST_BLOCKS = 12
 
 GROUPS = ("motor", "offset", "diagonal", "off-diagonal")
-_DIAGONAL, _OFF_DIAGONAL = slice(6, 9), slice(9, 12)
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,8 +153,8 @@ def prior(problem: Problem, free: int) -> Prior:
     width = np.zeros(SIZE)
     width[MOTOR] = np.inf
     width[OFFSET] = OPEN_OFFSET_MGAUSS if free >= 2 else TRUSTED_OFFSET_MGAUSS
-    width[_DIAGONAL] = OPEN_SOFT_IRON if free >= 3 else 0.0
-    width[_OFF_DIAGONAL] = OPEN_SOFT_IRON if free >= 4 else 0.0
+    width[DIAGONAL] = OPEN_SOFT_IRON if free >= 3 else 0.0
+    width[OFF_DIAGONAL] = OPEN_SOFT_IRON if free >= 4 else 0.0
     # A free shape and a free strength are one number too many: scale is then the model's.
     width[STRENGTH] = (1e-4 if free >= 3 else SCALE_WIDTH) * earth.strength
     width[SIN_DIP] = DIP_WIDTH
@@ -157,16 +163,29 @@ def prior(problem: Problem, free: int) -> Prior:
     return Prior(mean, width)
 
 
+@dataclass(frozen=True, eq=False)
+class FlightEstimate(Estimate):
+    """An estimate and the sizes of the errors it was made with.
+
+    Attributes
+    ----------
+    errors
+        None where those of the control quantity do not show.
+    """
+
+    errors: Noise | None = None
+
+
 def estimate(
     problem: Problem,
     free: int,
     *,
     start: FloatArray | None = None,
     hold_lags: bool = False,
-    noise: FloatArray | None = None,
+    errors: Noise | None = None,
     with_covariance: bool = True,
     rounds: int = ROUNDS,
-) -> Estimate:
+) -> FlightEstimate:
     """Fit one compass with the first ``free`` groups of :data:`GROUPS` open.
 
     Parameters
@@ -179,38 +198,67 @@ def estimate(
         Parameters to begin at, shape (16,); the prior's mean by default.
     hold_lags
         Keep the lags of ``start``.
-    noise
-        Spread of both residuals, mGauss, shape (2,), where known.
+    errors
+        Sizes of the errors where known; found in the residuals otherwise, unless the estimate is
+        one without covariance, which then takes the control quantity as exact.
     with_covariance
         False inside a search.
     rounds
         See :func:`magcomp.fit.robust.solve`.
     """
-    known = prior(problem, free)
-    if hold_lags:
-        width = known.width.copy()
-        width[[FIELD_LAG, REGRESSOR_LAG]] = 0.0
-        known = Prior(known.mean, width)
+    known = _with_lags_held(prior(problem, free)) if hold_lags else prior(problem, free)
     begin = known.mean if start is None else np.where(known.width > 0, start, known.mean)
     if hold_lags and start is not None:
         begin[[FIELD_LAG, REGRESSOR_LAG]] = start[[FIELD_LAG, REGRESSOR_LAG]]
     fixed = problem.sample(lags_of(begin)) if hold_lags else None
+    search = with_covariance and errors is None
 
-    def residuals(parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
-        rows = problem.sample(lags_of(parameters)) if fixed is None else fixed
-        return strength_and_dip(rows, parameters)
+    def rows_at(parameters: FloatArray) -> Samples:
+        return problem.sample(lags_of(parameters)) if fixed is None else fixed
 
-    blocks = drift_blocks(problem.readings.time) if with_covariance else None
-    return solve(
-        residuals,
-        begin,
-        known,
-        blocks=blocks,
-        doubt=_doubt(known),
-        noise=noise,
-        rounds=rounds,
-        feasible=is_physical,
+    def solved(begin: FloatArray, noise: Noise | None, *, last: bool) -> Estimate:
+        return solve(
+            lambda p: strength_and_dip(rows_at(p), p, noise),
+            begin,
+            known,
+            blocks=drift_blocks(problem.readings.time) if with_covariance and last else None,
+            doubt=_doubt(known),
+            rounds=rounds,
+            feasible=is_physical,
+        )
+
+    found = solved(begin, errors, last=not search)
+    if search:
+        errors = errors_of(rows_at(found.parameters), found.parameters)
+        found = solved(found.parameters, errors, last=True)
+    return FlightEstimate(**vars(found), errors=errors)
+
+
+def near(problem: Problem, free: int, start: FloatArray) -> FloatArray:
+    """The parameters of a part of the readings, from those of all of them.
+
+    Parameters
+    ----------
+    problem
+        A part of the readings.
+    free
+        Groups of :data:`GROUPS` that were open.
+    start
+        What all readings gave, shape (SIZE,); its lags are kept.
+    """
+    samples = problem.sample(lags_of(start))
+    errors = errors_of(samples, start)
+    values, _ = strength_and_dip(samples, start, errors)
+    known = _with_lags_held(prior(problem, free))
+    return one_step(
+        lambda p: strength_and_dip(samples, p, errors), start, known, spread_of(values, 0.2)
     )
+
+
+def _with_lags_held(known: Prior) -> Prior:
+    width = known.width.copy()
+    width[[FIELD_LAG, REGRESSOR_LAG]] = 0.0
+    return Prior(known.mean, width)
 
 
 def drift_blocks(time: FloatArray) -> IntArray:
@@ -253,11 +301,6 @@ def _doubt(known: Prior) -> Prior:
     return Prior(known.mean, width)
 
 
-def lags_of(parameters: FloatArray) -> Lags:
-    """The two lags among the parameters."""
-    return Lags(float(parameters[FIELD_LAG]), float(parameters[REGRESSOR_LAG]))
-
-
 def is_physical(parameters: FloatArray) -> bool:
     """Whether the soft iron is positive definite and the lags possible.
 
@@ -266,87 +309,6 @@ def is_physical(parameters: FloatArray) -> bool:
     values = np.linalg.eigvalsh(symmetric(parameters[SOFT_IRON]))
     lags = np.abs(parameters[[FIELD_LAG, REGRESSOR_LAG]])
     return bool(values[0] > 0.3 and values[-1] < 3.0 and np.all(lags < LAG_MOST_S))
-
-
-def strength_and_dip(samples: Samples, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Residuals in mGauss of sensor field, shape (n, 2), and derivatives, shape (n, 2, SIZE).
-
-    Notes
-    -----
-    The sensor's noise is alike on its axes, so the distance that counts is that in sensor axes
-    between a reading and the nearest field the model allows: D⁻¹ · (b − M·u) − offset with b the
-    earth's field at the known gravity and *any* heading. The heading is eliminated: of the three
-    components the one along which it moves the reading is left out, and the two that remain are
-    taken along the field (strength) and across it (dip). Slopes are those of the model's field,
-    not of the noisy reading, so noise is not taken for soft iron (errors in variables).
-    """
-    correction = unpack(parameters[:CORRECTION_SIZE])
-    strength, sine = parameters[STRENGTH], np.clip(parameters[SIN_DIP], -0.999, 0.999)
-    cosine = np.sqrt(1.0 - sine**2)
-    inverse: FloatArray = np.linalg.inv(correction.soft_iron).astype(np.float64)
-    corrected = correction.apply(samples.raw, samples.u)
-    down = samples.down
-    level = corrected - np.einsum("ij,ij->i", corrected, down)[:, None] * down
-    north = level / np.maximum(np.linalg.norm(level, axis=1), 1e-9)[:, None]
-    earth = strength * (cosine * north + sine * down)
-    along, across = _axes(earth, down, inverse)
-    apart = (corrected - earth) @ inverse.T
-    centred = (earth - np.multiply.outer(samples.u, correction.motor)) @ inverse.T
-    slopes = np.empty((len(samples), 2, SIZE))
-    for kind, axis in enumerate((along, across)):
-        pulled = axis @ inverse
-        rows = slopes[:, kind, :]
-        rows[:, MOTOR] = pulled * samples.u[:, None]
-        rows[:, OFFSET] = axis
-        rows[:, _DIAGONAL] = pulled * centred
-        for column, (i, j) in enumerate(((0, 1), (0, 2), (1, 2)), start=9):
-            rows[:, column] = pulled[:, i] * centred[:, j] + pulled[:, j] * centred[:, i]
-        rows[:, STRENGTH] = -np.einsum("ij,ij->i", pulled, earth) / strength
-        rows[:, SIN_DIP] = -strength * np.einsum("ij,ij->i", pulled, down - sine / cosine * north)
-        # A turn w of the body moves the field in body axes by w × b, which b × pulled weighs.
-        turned = np.cross(earth, pulled)
-        rows[:, FIELD_LAG] = np.einsum("ij,ij->i", turned, np.cross(down, samples.down_rate))
-        rows[:, TILT] = -turned[:, :2]
-        rows[:, LEAN] = -turned[:, :2] * _leaning(samples)
-        rows[:, REGRESSOR_LAG] = np.einsum("ij,ij->i", axis, samples.raw_rate) - (
-            pulled @ correction.motor * samples.u_rate
-        )
-    nuisance = parameters[CORRECTION_SIZE + 4 :]
-    residuals = np.stack(
-        [np.einsum("ij,ij->i", along, apart), np.einsum("ij,ij->i", across, apart)], axis=1
-    )
-    return residuals + slopes[:, :, CORRECTION_SIZE + 4 :] @ nuisance, slopes
-
-
-def _axes(
-    earth: FloatArray, down: FloatArray, inverse: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Unit vectors in sensor axes along the field and across it, both square to a turn."""
-    turn = np.cross(down, earth) @ inverse.T
-    turn /= np.maximum(np.linalg.norm(turn, axis=1), 1e-9)[:, None]
-    along = earth @ inverse.T
-    along -= np.einsum("ij,ij->i", along, turn)[:, None] * turn
-    along /= np.maximum(np.linalg.norm(along, axis=1), 1e-9)[:, None]
-    return along, np.cross(turn, along)
-
-
-def _leaning(samples: Samples) -> FloatArray:
-    """Roll and pitch, slowly followed: what acceleration does to an attitude filter, (n, 2).
-
-    A multirotor accelerates where it leans, and its attitude filter takes the acceleration for
-    gravity within a few seconds.
-    """
-    if len(samples) < 2:
-        return np.zeros((len(samples), 2))
-    step = max(float(np.median(np.diff(samples.time))), 1e-3)
-    share = step / (LEAN_S + step)
-    tilt = samples.attitude[:, :2] - np.median(samples.attitude[:, :2], axis=0)
-    return low_pass(tilt, share)
-
-
-def vertical_of(parameters: FloatArray) -> float:
-    """Downward part of the earth's field, mGauss."""
-    return float(parameters[STRENGTH] * parameters[SIN_DIP])
 
 
 def correction_of(found: Estimate) -> Correction:

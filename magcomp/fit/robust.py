@@ -121,14 +121,14 @@ def solve(
     moving = prior.width > 0.0
     parameters = start.astype(np.float64)
     values, slopes = residuals(parameters)
-    scale = _spread(values, noise_floor) if noise is None else noise
+    scale = spread_of(values, noise_floor) if noise is None else noise
     for _ in range(rounds if noise is None else 1):
         parameters, values, slopes = _descend(
             residuals, parameters, values, slopes, prior, moving, scale, feasible
         )
         if noise is not None:
             break
-        previous, scale = scale, _spread(values, noise_floor)
+        previous, scale = scale, spread_of(values, noise_floor)
         if np.all(np.abs(scale / previous - 1) < 0.02):
             break
     weights = _weights(values / scale)
@@ -153,11 +153,39 @@ def solve(
     )
 
 
+def one_step(
+    residuals: Residuals, start: FloatArray, prior: Prior, scale: FloatArray
+) -> FloatArray:
+    """The parameters after a single Gauss–Newton step from a point near the solution.
+
+    Parameters
+    ----------
+    residuals, prior
+        As for :func:`solve`.
+    start
+        Near the solution, shape (k,).
+    scale
+        σ of each kind of residual, shape (g,).
+    """
+    moving = prior.width > 0.0
+    values, slopes = residuals(start)
+    weights = _weights(values / scale) / scale**2
+    design = _columns(slopes, moving).reshape(-1, int(moving.sum()))
+    weighted = design * weights.reshape(-1, 1)
+    precision = prior.precision[moving]
+    gradient = weighted.T @ values.reshape(-1) + precision * (start - prior.mean)[moving]
+    parameters = start.astype(np.float64)
+    hessian = weighted.T @ design + np.diag(precision)
+    parameters[moving] -= np.linalg.pinv(hessian, hermitian=True) @ gradient
+    return parameters
+
+
 def _columns(slopes: FloatArray, moving: BoolArray) -> FloatArray:
     return slopes if moving.all() else slopes[:, :, moving]
 
 
-def _spread(values: FloatArray, floor: float) -> FloatArray:
+def spread_of(values: FloatArray, floor: float) -> FloatArray:
+    """Robust σ of each kind of residual, shape (g,), and at least the rounding of the readings."""
     return np.maximum(_MAD_TO_STD * np.median(np.abs(values), axis=0), floor)
 
 

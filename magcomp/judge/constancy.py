@@ -13,16 +13,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from magcomp.fit import Problem
-from magcomp.fit.flight import (
+from magcomp.fit.field_model import (
     FIELD_LAG,
     REGRESSOR_LAG,
     SIN_DIP,
     SIZE,
     STRENGTH,
-    drift_blocks,
-    prior,
     strength_and_dip,
 )
+from magcomp.fit.flight import drift_blocks, prior
 from magcomp.fit.robust import time_blocks
 from magcomp.model import (
     CORRECTION_SIZE,

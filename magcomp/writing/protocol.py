@@ -53,6 +53,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from magcomp import autopilots
 from magcomp.mavlink.parameters import REAL32, ParamValue, fits
 from magcomp.writing.events import (
     Event,
@@ -127,7 +128,7 @@ class WriteSequence:
 
     def __init__(self, plan: WritePlan, *, now: float, timing: Timing | None = None) -> None:
         self._plan = plan
-        self._timing = timing or Timing()
+        self._timing = timing or Timing(storing=autopilots.of(plan.vehicle).storage_s)
         self._values: Mapping[str, float] = plan.new
         self._switches: Mapping[str, float] = plan.switches
         self._rolling_back: RollingBack | None = None

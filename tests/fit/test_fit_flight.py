@@ -12,14 +12,8 @@ from magcomp.autopilots import ardupilot
 from magcomp.earth import EarthField
 from magcomp.errors import FitRejectedError, MissingDataError, UsageError
 from magcomp.fit import Problem, fit
-from magcomp.fit.flight import (
-    SIZE,
-    TRUSTED_OFFSET_MGAUSS,
-    is_physical,
-    lags_of,
-    prior,
-    strength_and_dip,
-)
+from magcomp.fit.field_model import SIZE, lags_of, strength_and_dip
+from magcomp.fit.flight import TRUSTED_OFFSET_MGAUSS, is_physical, prior
 from magcomp.model import MotorFit, Series, pack
 
 NOTHING = {

@@ -13,6 +13,9 @@ import staged
 from syrupy.extensions.single_file import SingleFileSnapshotExtension, WriteMode
 from textual import __version__ as textual_version
 
+from magcomp.tui.widgets.key_bar import KeyBar
+from magcomp.tui.widgets.next_line import NextLine
+
 MADE_WITH = "8.2.8"
 
 
@@ -37,6 +40,31 @@ def test_screen(stage, size, tmp_path, snapshot, snap_compare):
     assert len(shown[0].splitlines()) <= size[1]
     assert max(map(len, shown[0].splitlines())) <= size[0]
     assert same or textual_version != MADE_WITH
+
+
+@pytest.mark.parametrize("size", [(60, 20), (200, 60)], ids=["60x20", "200x60"])
+@pytest.mark.parametrize(
+    "stage",
+    [staged.record, staged.fit_fits, staged.review_written, staged.verify_measured],
+    ids=lambda stage: stage.__name__,
+)
+async def test_nothing_is_cut_off_at_the_smallest_and_the_largest_terminal(stage, size, tmp_path):
+    app = staged.app(tmp_path)
+    async with app.run_test(size=size) as pilot:
+        await stage(pilot)
+        await scripted.steady(pilot)
+        step = app.screen
+        foot = step.query_one(NextLine).region.y
+        assert step.query_one(KeyBar).region.bottom == size[1]
+        for panel in step.query(".panel, .view, #changes, #facts, #held-now, #place"):
+            if panel.region.area:
+                assert panel.region.bottom <= foot
+                assert panel.region.right <= size[0]
+        shown = scripted.picture(app)
+        for keys in (
+            b.description for _, b, on, _ in step.active_bindings.values() if on and b.show
+        ):
+            assert keys in shown
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,114 @@
+"""Errors of the control quantity: they move a reading along the motor vector.
+
+A current is measured late, seldom and with noise. Its error e moves both residuals of a reading by
+e·a, where a is the motor vector as the residuals see it. Such errors lie along one direction, and
+the other one is worth many times more: the residuals are whitened by diag(σ²) + σᵤ² a aᵀ
+(docs/method.md, Flights).
+
+The slopes stay those at the u that was reported. Whether a motor vector fitted so comes out too
+short (errors of a measurement) or not (errors of a smoothed or rebuilt current, which do not
+depend on what is reported) cannot be told from the residuals; on recorded flights it does not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from magcomp.model import FloatArray
+
+MOST_SHARE = 0.25
+"""σᵤ is at most this share of the spread of u: beyond it, u would not be a measurement."""
+
+_LEAST_SIGNAL = 3.0
+_ROUNDS = 25
+_ROBUST = 3.0
+_SETTLED = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """What the two residuals of a reading are made of.
+
+    Attributes
+    ----------
+    sensor
+        σ of each residual but for the control quantity, mGauss, shape (2,).
+    control
+        σᵤ, in the unit of the control quantity.
+    """
+
+    sensor: FloatArray
+    control: float
+
+
+def whitened(rows: FloatArray, pulls: FloatArray, noise: Noise) -> FloatArray:
+    """Residuals (n, 2) or slopes (n, 2, k) made independent, still in mGauss of the sensor.
+
+    Parameters
+    ----------
+    rows
+        What to whiten.
+    pulls
+        Change of the residuals by one unit of u, shape (n, 2).
+    noise
+        The sizes of the errors.
+
+    Notes
+    -----
+    L⁻¹ · rows with L Lᵀ = diag(σ²) + σᵤ² a aᵀ, times σ: without errors of u nothing changes.
+    """
+    first, second = noise.sensor
+    shared = noise.control * pulls
+    one = np.hypot(first, shared[:, 0])
+    mixed = shared[:, 0] * shared[:, 1] / one
+    two = np.sqrt(np.maximum(second**2 + shared[:, 1] ** 2 - mixed**2, 1e-12))
+    more = (slice(None), *[None] * (rows.ndim - 2))
+    top = rows[:, 0] / one[more]
+    bottom = (rows[:, 1] - mixed[more] * top) / two[more]
+    return np.stack([first * top, second * bottom], axis=1)
+
+
+def noise_of(values: FloatArray, pulls: FloatArray, spread_u: float) -> Noise | None:
+    """The errors that make such residuals, or None where u does not show in them.
+
+    Parameters
+    ----------
+    values, pulls
+        Residuals, and their change by one unit of u, shape (n, 2).
+    spread_u
+        Standard deviation of u.
+
+    Notes
+    -----
+    Expectation maximisation with the error of u as the hidden factor; readings far out count
+    less.
+    """
+    sensor = np.maximum(1.4826 * np.median(np.abs(values), axis=0), 0.2)
+    signal = float(np.median(np.linalg.norm(pulls, axis=1))) * spread_u
+    if signal < _LEAST_SIGNAL * float(np.linalg.norm(sensor)):
+        return None
+    most = MOST_SHARE * spread_u
+    noise = Noise(sensor, most / 4)
+    for _ in range(_ROUNDS):
+        error = _error_of_control(values, pulls, noise)
+        left = values - pulls * error[:, None]
+        far = np.sum((left / noise.sensor) ** 2, axis=1) + (error / noise.control) ** 2
+        weight = 1.0 / (1.0 + far / (2 * _ROBUST**2))
+        weight /= np.sum(weight)
+        precision = np.sum((pulls / noise.sensor) ** 2, axis=1) + 1.0 / noise.control**2
+        control = float(np.sqrt(weight @ (error**2 + 1.0 / precision)))
+        spread = weight @ (left**2 + pulls**2 / precision[:, None])
+        before = noise.control
+        noise = Noise(np.maximum(np.sqrt(spread), 0.2), float(np.clip(control, 1e-3, most)))
+        if abs(noise.control / before - 1.0) < _SETTLED:
+            break
+    return noise
+
+
+def _error_of_control(values: FloatArray, pulls: FloatArray, noise: Noise) -> FloatArray:
+    """The most probable error of u at each reading, shape (n,)."""
+    weighted = pulls / noise.sensor**2
+    precision = np.sum(weighted * pulls, axis=1) + 1.0 / noise.control**2
+    return np.asarray(np.sum(weighted * values, axis=1) / precision)
