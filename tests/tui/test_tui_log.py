@@ -133,6 +133,25 @@ async def test_fits_of_two_time_ranges_stand_side_by_side_and_either_can_be_show
         assert 0.0 < rows[2].apart < 1.0
 
 
+async def test_a_time_range_is_chosen_by_eye_with_the_arrow_keys(tmp_path):
+    app = scripted.app(tmp_path, str(SWEEP))
+    async with app.run_test() as pilot:
+        await fitted(pilot)
+        await pilot.press("t")
+        await until(pilot, lambda: "━" * 60 in scripted.picture(app))
+        await press(pilot, *["up"] * 10, "tab", *["down"] * 10)
+        first, last = (float(field.value) for field in app.screen.query(Input))
+        whole = app.work.recording.duration_s
+        assert first == pytest.approx(whole / 6.0, abs=6.0)
+        assert last == pytest.approx(5.0 * whole / 6.0, abs=6.0)
+        strip = next(
+            line for line in scripted.picture(app).splitlines() if "━·" in line and "·━" in line
+        )
+        assert strip.count("━") == pytest.approx(
+            strip.count("·") * (last - first) / (whole - last + first), abs=3
+        )
+
+
 async def test_every_method_is_reached_and_one_that_cannot_fit_does_not_end_the_round(tmp_path):
     async with scripted.app(tmp_path, str(SWEEP)).run_test() as pilot:
         await fitted(pilot)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -10,6 +10,7 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Horizontal, Vertical, VerticalScroll
 from textual.screen import ModalScreen
+from textual.widget import Widget
 from textual.widgets import Button, Input, Label, Markdown, Static
 
 
@@ -151,6 +152,7 @@ class AskText(ModalScreen["tuple[str, ...] | None"]):
         with Vertical(classes="dialog") as dialog:
             dialog.border_title = self._title
             yield Static(self._explanation, markup=False, classes="sentence")
+            yield from self.body()
             for label, value in self._fields:
                 yield Label(label)
                 yield Input(value, select_on_focus=True)
@@ -162,6 +164,10 @@ class AskText(ModalScreen["tuple[str, ...] | None"]):
     def on_mount(self) -> None:
         """Begin in the first line."""
         self.query(Input).first().focus()
+
+    def body(self) -> Iterable[Widget]:
+        """What stands between the explanation and the lines."""
+        return ()
 
     def action_cancel(self) -> None:
         """Leave everything as it is."""
