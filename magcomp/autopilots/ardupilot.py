@@ -1,4 +1,4 @@
-"""ArduPilot: every fact of it that magcomp needs (ArduCopter 4.6.3; docs/autopilots.md)."""
+"""Every fact of ArduPilot that magcomp needs: docs/autopilots.md, ArduPilot."""
 
 from __future__ import annotations
 
