@@ -202,6 +202,11 @@ class Autopilot(Protocol):
         ...
 
     @property
+    def first_compass_message(self) -> str:
+        """Telemetry message that carries the first compass."""
+        ...
+
+    @property
     def storage_s(self) -> float:
         """Seconds after which a write survives a restart."""
         ...
