@@ -244,6 +244,7 @@ class ArduPilot:
         *,
         regressor: str,  # noqa: ARG002
         soft_iron_fitted: bool,
+        usual: float = 0.0,  # noqa: ARG002
     ) -> dict[str, float]:
         """COMPASS_OFS, DIA, ODI and MOT; COMPASS_SCALE stays as it is.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, TypeVar
 
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
@@ -13,8 +13,16 @@ from textual.screen import ModalScreen
 from textual.widget import Widget
 from textual.widgets import Button, Input, Label, Markdown, Static
 
+Answer = TypeVar("Answer")
 
-class Message(ModalScreen[None]):
+
+class Dialog(ModalScreen[Answer]):
+    """What the questions have in common: on a low terminal they leave out air, never a line."""
+
+    VERTICAL_BREAKPOINTS = [(0, "-short"), (32, "-tall")]  # noqa: RUF012 - as in Screen
+
+
+class Message(Dialog[None]):
     """A sentence and the next step; Enter goes on.
 
     Parameters
@@ -43,7 +51,7 @@ class Message(ModalScreen[None]):
         self.dismiss()
 
 
-class Confirm(ModalScreen[bool]):
+class Confirm(Dialog[bool]):
     """A question whose safe answer is the default.
 
     Parameters
@@ -120,7 +128,7 @@ class Fault:
     sentence: str
 
 
-class AskText(ModalScreen["tuple[str, ...] | None"]):
+class AskText(Dialog["tuple[str, ...] | None"]):
     """One or two lines of text; Escape gives None.
 
     Parameters
@@ -194,7 +202,7 @@ class AskText(ModalScreen["tuple[str, ...] | None"]):
         self.query(Input)[fault.line].focus()
 
 
-class Help(ModalScreen[None]):
+class Help(Dialog[None]):
     """Help for what has the focus, and the keys of the screen with their names.
 
     Parameters
