@@ -1,4 +1,4 @@
-"""ArduPilot: every fact of it that magcomp needs (ArduCopter 4.6.3; docs/autopilots.md)."""
+"""Every fact of ArduPilot that magcomp needs: docs/autopilots.md, ArduPilot."""
 
 from __future__ import annotations
 
@@ -244,6 +244,7 @@ class ArduPilot:
         *,
         regressor: str,  # noqa: ARG002
         soft_iron_fitted: bool,
+        usual: float = 0.0,  # noqa: ARG002
     ) -> dict[str, float]:
         """COMPASS_OFS, DIA, ODI and MOT; COMPASS_SCALE stays as it is.
 
