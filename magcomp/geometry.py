@@ -30,7 +30,7 @@ def level_matrix(roll: ArrayLike, pitch: ArrayLike) -> FloatArray:
 
     Notes
     -----
-    PAPER.md equation 1.
+    docs/method.md, Equation 1.
     """
     roll, pitch = np.broadcast_arrays(np.asarray(roll, float), np.asarray(pitch, float))
     sin_roll, cos_roll = np.sin(roll), np.cos(roll)
@@ -56,7 +56,7 @@ def body_from_earth(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> FloatA
 
     Notes
     -----
-    Level axes turned by the heading: C(φ,θ)ᵀ · R_z(ψ)ᵀ, PAPER.md equation 1.
+    Level axes turned by the heading: C(φ,θ)ᵀ · R_z(ψ)ᵀ, docs/method.md, Equation 1.
     """
     yaw = np.asarray(yaw, float)
     cos_yaw, sin_yaw = np.cos(yaw), np.sin(yaw)
@@ -88,7 +88,7 @@ def heading(
 
     Notes
     -----
-    PAPER.md equation 2.
+    docs/method.md, Equation 2.
     """
     level = np.einsum("...ij,...j->...i", level_matrix(roll, pitch), np.asarray(field, float))
     return wrap_angle(np.arctan2(-level[..., 1], level[..., 0]) + declination)
@@ -108,7 +108,7 @@ def heading_shift(
 
     Notes
     -----
-    PAPER.md equation 7.
+    docs/method.md, Equation 7.
     """
     level = level_matrix(roll, pitch)
     shift = np.einsum("...ij,...j->...i", level, np.asarray(disturbance, float))

@@ -52,7 +52,8 @@ def readings(
 
     Notes
     -----
-    ArduPilot repeats a reading until the next one (AUTOPILOTS.md, Timing): only changes are new.
+    ArduPilot repeats a reading until the next one: only changes are new (docs/autopilots.md,
+    ArduPilot: timing).
     """
     reported = recording.field.get(compass)
     if reported is None:

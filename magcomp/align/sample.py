@@ -36,7 +36,8 @@ def sample(
 
     Notes
     -----
-    raw = soft_iron⁻¹ · (corrected − MOT · u) − OFS, AUTOPILOTS.md "Undo".
+    raw = soft_iron⁻¹ · (corrected − MOT · u) − OFS, undone
+    as in docs/autopilots.md, ArduPilot: correction.
     """
     measured = readings.time - lags.field
     commanded = readings.time - lags.regressor

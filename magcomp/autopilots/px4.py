@@ -19,6 +19,7 @@ from magcomp.autopilots.protocol import (
     ThrustCurve,
 )
 from magcomp.autopilots.px4_correction import (
+    MGAUSS,
     REGRESSOR_OF,
     Calibration,
     Compensation,
@@ -102,6 +103,7 @@ class Px4:
     compass_prefix = "CAL_MAG"
     device_id_names = tuple(single_name("ID", number) for number in NUMBERS)
     batteries = (0, 1)
+    first_compass_message = "SCALED_IMU"
     storage_s = 2.5  # it saves all at once, 0.3 s after a change and not again for 2 s
     device_ids_describe = "bus, address and type of a sensor, which are alike in vehicles of a kind"
 
@@ -217,6 +219,7 @@ class Px4:
         *,
         regressor: str,
         soft_iron_fitted: bool,
+        usual: float = 0.0,
     ) -> dict[str, float]:
         """COMP and OFF, and SCALE and ODIAG where fitted, such that the firmware notices them."""
         rotation = sensor_to_body(values, compass)
@@ -225,6 +228,10 @@ class Px4:
         if not soft_iron_fitted:
             wanted = _with_shape(wanted, present)
         made = noticed(wanted, present, offset_zone(values), rotation)
+        power = usual if regressor == THROTTLE else usual / MGAUSS
+        if power > 0.0:
+            missed = (made.offset - wanted.offset) / power
+            made = replace(made, motor=made.motor + missed)
         found = _vector("COMP", compass, made.motor) | _vector("OFF", compass, made.offset)
         if soft_iron_fitted:
             found |= _vector("SCALE", compass, made.scale)

@@ -1,4 +1,4 @@
-"""How a disturbance that the motors make turns the heading: PAPER.md equations 8 to 11.
+"""How a disturbance that the motors make turns the heading: docs/method.md, Equations 8 to 11.
 
 Equations 1, 2 and 7 are in :mod:`magcomp.geometry`.
 """
@@ -30,7 +30,7 @@ def level_components(strength: ArrayLike, dip: ArrayLike, heading: ArrayLike) ->
 
     Notes
     -----
-    PAPER.md equation 8.
+    docs/method.md, Equation 8.
     """
     horizontal = np.asarray(strength, float) * np.cos(dip)
     return np.stack([horizontal * np.cos(heading), -horizontal * np.sin(heading)], axis=-1)
@@ -50,7 +50,7 @@ def level_heading_shift(
 
     Notes
     -----
-    PAPER.md equation 9.
+    docs/method.md, Equation 9.
     """
     along = np.cos(heading) * np.asarray(right, float) + np.sin(heading) * np.asarray(
         forward, float
@@ -72,7 +72,7 @@ def disturbance(size: ArrayLike, elevation: ArrayLike, azimuth: ArrayLike) -> Fl
 
     Notes
     -----
-    PAPER.md equation 10.
+    docs/method.md, Equation 10.
     """
     size = np.asarray(size, float)
     return np.stack(
@@ -107,7 +107,7 @@ def shift_per_size(
 
     Notes
     -----
-    PAPER.md equation 11: at a fixed attitude the shift is this times H_m, and H_m grows with
+    docs/method.md, Equation 11: at a fixed attitude the shift is this times H_m, and H_m grows with
     the control quantity.
     """
     unit = disturbance(1.0, elevation, azimuth)

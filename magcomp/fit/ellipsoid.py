@@ -1,6 +1,6 @@
 """Ellipsoids of raw field: one shape, one or many centres.
 
-Every raw reading lies on |D · (raw − centre)| = F (PAPER.md 4–6). D is kept
+Every raw reading lies on |D · (raw − centre)| = F (docs/method.md, Equations 4 to 6). D is kept
 symmetric and positive definite, so the surface is an ellipsoid and nothing
 else; several levels of the control quantity share D and have a centre each.
 """

@@ -5,7 +5,7 @@ at every attitude and every control quantity, and its part along gravity must be
 the earth's vertical part. Neither residual contains the heading, so an error of
 heading cannot leak in::
 
-    r₁ = |c| − F                (PAPER.md 4)
+    r₁ = |c| − F                (docs/method.md, Equation 4)
     r₂ = c · down − F sin(dip)
 
 Both lags are parameters like the others. How much is free follows from what the
@@ -72,7 +72,7 @@ LEAN_WIDTH = 0.1
 """Radians of attitude error a radian of lean held for seconds."""
 
 LAG_MEAN_S, LAG_WIDTH_S, LAG_MOST_S = 0.08, 0.1, 0.6
-"""AUTOPILOTS.md, Timing: the field lags by 0.05–0.1 s, the current by something of that order."""
+"""The field and the current are late by some 0.1 s: docs/autopilots.md, ArduPilot: timing."""
 
 DIP_WIDTH = 0.02
 """The world model misses the sine of the local dip by about this much."""

@@ -1,7 +1,7 @@
 """The line in space on which the ellipsoid centres lie, in three forms.
 
-- :func:`paper_line`: the paper's iteration exactly, PAPER.md 14–16. It has no
-  answer for a line perpendicular to z, lets constants of its design matrix
+- :func:`paper_line`: the paper's iteration exactly (docs/method.md, Equations 14 to 16). It has
+  no answer for a line perpendicular to z, lets constants of its design matrix
   move, and treats all errors as equal.
 - :func:`orthogonal_line`: through the centroid along the first principal
   direction: the most probable line for equal errors in every direction.
@@ -65,8 +65,8 @@ def paper_line(centres: FloatArray, *, threshold: float = 1e-9, most: int = 20_0
 
     Notes
     -----
-    PAPER.md 13 (the form), 14 (V = B·ξ − L), 15 (B̂ᵀB̂·ξ = B̂ᵀL with the observed L),
-    16 ((E + ξξᵀ)·B̂ᵀ = Bᵀ + ξLᵀ). As in 16, every element of B̂ may move.
+    docs/method.md, Equations 13 to 16: the form, V = B·ξ − L, B̂ᵀB̂·ξ = B̂ᵀL with the observed L,
+    and (E + ξξᵀ)·B̂ᵀ = Bᵀ + ξLᵀ. As in 16, every element of B̂ may move.
     """
     centres = _checked(centres)
     count = len(centres)
@@ -124,8 +124,8 @@ def weighted_line(centres: FloatArray, covariances: FloatArray) -> SpaceLine:
     Notes
     -----
     Minimises Σ (xₖ − P − tₖ d)ᵀ Σₖ⁻¹ (xₖ − P − tₖ d) over P, d and every tₖ, in turn: the
-    positions for a given line, then the line for given positions (PAPER.md, "What an engineer
-    must know": constants exact, one z, each centre with its own covariance).
+    positions for a given line, then the line for given positions (docs/method.md, Three
+    lines).
     """
     centres = _checked(centres)
     precision: FloatArray = np.asarray(np.linalg.inv(covariances), dtype=np.float64)
@@ -166,9 +166,8 @@ def line_through(levels: tuple[Level, ...]) -> Line:
 
     Notes
     -----
-    PAPER.md: "The line alone carries no control quantity. The position along it must be
-    regressed on the control quantity, which has error of its own": York's regression with both
-    errors, position on u.
+    York's regression with errors of both, position on u (docs/method.md, Position along the
+    line).
     """
     centres = np.stack([level.centre for level in levels])
     covariances = np.stack([level.covariance for level in levels])

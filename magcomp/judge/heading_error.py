@@ -68,8 +68,8 @@ def heading_errors(
 
     Notes
     -----
-    ``before`` is exact; ``after`` and ``p95`` use the first-order shift of PAPER.md 7 on draws
-    of all 12 parameters.
+    ``before`` is exact; ``after`` and ``p95`` use the first-order shift of docs/method.md,
+    Equation 7, on draws of all 12 parameters.
     """
     roll, pitch, yaw = attitudes()
     horizontal = np.sqrt(max(fit.strength**2 - fit.vertical**2, 1.0))

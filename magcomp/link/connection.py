@@ -24,7 +24,7 @@ from magcomp.link.opening import open_transport
 from magcomp.link.quality import LinkStatistics
 from magcomp.link.sinks import FrameSink, Sinks
 from magcomp.link.state import LinkState
-from magcomp.link.streams import DEFAULT_RATES, StreamReport, affordable
+from magcomp.link.streams import DEFAULT_RATES, StreamReport, affordable, as_sent_by
 from magcomp.link.transport import ReplayEndedError, Transport, TransportClosedError
 from magcomp.model import Vehicle
 
@@ -229,6 +229,8 @@ class Connection:
         if isinstance(address, SerialLine) and address.baud < _SLOW_BAUD:
             rates = affordable(rates, address.baud / 10)
         with self._changed:
+            if (vehicle := self._state.vehicle) is not None:
+                rates = as_sent_by(vehicle, rates)
             self._state.request_streams(rates, self._now())
             report = self._state.stream_report
             if report is None:

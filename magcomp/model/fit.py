@@ -44,7 +44,7 @@ def symmetric(six: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """The centre of the raw ellipsoid at one control quantity: a point of the paper's Fig. 4.
+    """The centre of the raw ellipsoid at one control quantity: docs/method.md, Fig. 4.
 
     Attributes
     ----------

@@ -144,7 +144,7 @@ def _change(name: str, new: float, old: float) -> Text:
 
 
 def levels(result: CompassResult) -> Table:
-    """Centre of the ellipsoid at each level of the control quantity: the paper's Fig. 4."""
+    """Centre of the ellipsoid at each level of the control quantity: docs/method.md, Fig. 4."""
     fit = result.fit
     table = Table(box=None, pad_edge=False, padding=(0, 1), show_edge=False)
     table.add_column(Text(f"   {fit.regressor}", style="dim"), justify="right", min_width=10)

@@ -77,7 +77,7 @@ class Shift:
 
 
 def shift(result: CompassResult) -> Shift:
-    """Centres and line of one compass; PAPER.md Fig. 4, seen along each axis."""
+    """Centres and line of one compass; docs/method.md, Fig. 4, seen along each axis."""
     fit = result.fit
     scale = 1.0 if fit.regressor == CURRENT else 100.0
     rest = fit.correction.centre(0.0)

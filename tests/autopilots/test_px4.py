@@ -178,12 +178,18 @@ def test_an_offset_too_near_to_be_noticed_turns_the_heading_little(away, restart
     turn = sensor_to_body(before, 1)
     present = PX4.in_force(before, 1).correction
     moved = Correction(present.offset - 1000.0 * turn @ away, present.soft_iron, np.ones(3))
-    written = PX4.correction_parameters(moved, 1, before, regressor=CURRENT, soft_iron_fitted=False)
+    written = PX4.correction_parameters(
+        moved, 1, before, regressor=CURRENT, soft_iron_fitted=False, usual=20.0
+    )
     written["CAL_MAG_COMP_TYP"] = 2.0
     firmware = in_the_firmware(before, written, 1, restarted=restarted)
-    missed = body_correction(firmware, turn).offset - moved.offset
+    applied = body_correction(firmware, turn)
     # All of it would be up to 5 mGauss level, 1.3° at 216 mGauss of horizontal field.
-    assert np.hypot(*missed[:2]) < 2.0
+    assert np.hypot(*(applied.offset - moved.offset)[:2]) < 3.6
+    raw = np.array([[200.0, -100.0, 400.0]])
+    hover, top = np.array([20.0]), np.array([40.0])
+    assert np.allclose(applied.apply(raw, hover), moved.apply(raw, hover), atol=1e-3)
+    assert np.abs(applied.apply(raw, top) - moved.apply(raw, top)).max() < 6.0
 
 
 def test_a_compass_whose_calibration_is_right_keeps_it_to_the_last_bit():

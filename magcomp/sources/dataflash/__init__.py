@@ -178,5 +178,6 @@ def _with_fractions(each: Readings, number: int, parameters: ParameterHistory) -
             offset = autopilot.in_force_at(parameters, number, moment).correction.offset
         except MagcompError:
             continue
-        exact = np.where(np.trunc(offset) == whole, offset, exact)
+        since = each.field.time[:, np.newaxis] >= moment
+        exact = np.where(since & (np.trunc(offset) == whole), offset, exact)
     return exact
