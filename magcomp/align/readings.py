@@ -137,7 +137,13 @@ def _list_compasses(recording: Recording) -> str:
 
 
 def is_new(value: FloatArray) -> BoolArray:
-    """Whether each reading, shape (n, 3), differs from the one before it; shape (n,)."""
+    """Whether each reading, shape (n, 3), differs from the one before it; shape (n,).
+
+    Examples
+    --------
+    >>> is_new(np.array([[1.0, 2.0, 3.0], [1.0, 2.0, 3.0], [1.0, 2.0, 4.0]])).tolist()
+    [True, False, True]
+    """
     changed = np.any(np.diff(value, axis=0) != 0.0, axis=1)
     return np.concatenate([[True], changed])
 

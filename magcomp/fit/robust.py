@@ -186,7 +186,15 @@ def _columns(slopes: FloatArray, moving: BoolArray) -> FloatArray:
 
 
 def spread_of(values: FloatArray, floor: float) -> FloatArray:
-    """Robust σ of each kind of residual, shape (g,), and at least the rounding of the readings."""
+    """Robust σ of each kind of residual, shape (g,), and at least the rounding of the readings.
+
+    Examples
+    --------
+    One reading far out does not widen it:
+
+    >>> spread_of(np.array([[-1.0], [1.0], [-1.0], [1.0], [500.0]]), 0.1).round(4).tolist()
+    [1.4826]
+    """
     return np.maximum(_MAD_TO_STD * np.median(np.abs(values), axis=0), floor)
 
 
@@ -294,5 +302,11 @@ def recorded_time(time: FloatArray) -> FloatArray:
 
 
 def time_blocks(time: FloatArray, seconds: float) -> IntArray:
-    """Number of the block of ``seconds`` of recording each moment falls into, shape (n,)."""
+    """Number of the block of ``seconds`` of recording each moment falls into, shape (n,).
+
+    Examples
+    --------
+    >>> time_blocks(np.array([10.0, 11.9, 12.0, 17.0]), 2.0).tolist()
+    [0, 0, 1, 3]
+    """
     return np.asarray(np.floor(recorded_time(time) / seconds), dtype=np.intp)

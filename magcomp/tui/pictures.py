@@ -11,8 +11,9 @@ from magcomp.model import CURRENT, CompassResult, FloatArray
 from magcomp.report import words
 from magcomp.report.evidence import CompassPlots
 
-AXES = ("x", "y", "z")
 AXIS_WORDS = ("forward", "right", "down")
+AXES = tuple(word[0] for word in AXIS_WORDS)
+"""How a picture marks them."""
 
 
 @dataclass(frozen=True)
