@@ -114,6 +114,8 @@ def run(arguments: list[str]) -> int:
     except Exception as error:
         sentence, code, foreseen = _explain(error)
         complain(sentence)
+        for note in getattr(error, "__notes__", ()):
+            complain(note)
         if not foreseen and ("--debug" in arguments or os.environ.get("MAGCOMP_DEBUG")):
             traceback.print_exception(error)
         return code
