@@ -144,7 +144,8 @@ class Connection:
                 raise LinkError(
                     f"One vehicle of a number must be on {self.address}; instead two at different "
                     f"addresses say that they are system {self._state.heartbeats[0].system}. "
-                    "Give one of them another number, or switch it off."
+                    "Give one of them another number or switch it off; where both are one "
+                    "vehicle, --system takes the one heard first."
                 )
             if self._state.ambiguous():
                 systems = " and ".join(
