@@ -1,4 +1,4 @@
-"""PX4: every fact of it that magcomp needs (release/1.12 to 1.17)."""
+"""Every fact of PX4 that magcomp needs, release/1.12 to 1.17: docs/autopilots.md, PX4."""
 
 from __future__ import annotations
 
@@ -123,8 +123,8 @@ class Px4:
                 + (
                     "holds no parameters: give the .ulg of the same flight"
                     if not recording.parameters.names
-                    else "does not, so its firmware is older than 1.12 or its parameters are not "
-                    "whole: give the .ulg of a newer firmware"
+                    else "does not: its firmware is older than 1.12, or its parameters are not "
+                    "whole; update it and record again, or give the whole .ulg"
                 )
             )
 

@@ -1,5 +1,7 @@
 """Parameters that bring a wanted calibration into force in spite of the firmware's dead zones.
 
+docs/autopilots.md, PX4: in force, and PX4: what is written.
+
 PX4 goes on with its old OFF, SCALE or ODIAG where the new one differs too little from it, and
 after a start with 0, 1 or 0 where the stored one differs too little from these. So a value that
 would not be noticed is either left at what is in force or moved past the zone, whichever turns

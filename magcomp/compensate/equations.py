@@ -31,6 +31,11 @@ def level_components(strength: ArrayLike, dip: ArrayLike, heading: ArrayLike) ->
     Notes
     -----
     docs/method.md, Equation 8.
+
+    Examples
+    --------
+    >>> level_components(500.0, np.radians(60.0), 0.0).round(6).tolist()
+    [250.0, -0.0]
     """
     horizontal = np.asarray(strength, float) * np.cos(dip)
     return np.stack([horizontal * np.cos(heading), -horizontal * np.sin(heading)], axis=-1)
@@ -51,6 +56,11 @@ def level_heading_shift(
     Notes
     -----
     docs/method.md, Equation 9.
+
+    Examples
+    --------
+    >>> float(level_heading_shift(0.0, 10.0, 200.0, 0.0, 0.0))
+    -0.05
     """
     along = np.cos(heading) * np.asarray(right, float) + np.sin(heading) * np.asarray(
         forward, float
@@ -73,6 +83,11 @@ def disturbance(size: ArrayLike, elevation: ArrayLike, azimuth: ArrayLike) -> Fl
     Notes
     -----
     docs/method.md, Equation 10.
+
+    Examples
+    --------
+    >>> disturbance(10.0, np.radians(90.0), 0.0).round(9).tolist()
+    [0.0, 0.0, 10.0]
     """
     size = np.asarray(size, float)
     return np.stack(
@@ -109,6 +124,13 @@ def shift_per_size(
     -----
     docs/method.md, Equation 11: at a fixed attitude the shift is this times H_m, and H_m grows with
     the control quantity.
+
+    Examples
+    --------
+    A disturbance to the right at heading north, where 250 mGauss are horizontal:
+
+    >>> float(np.round(shift_per_size(0.0, np.pi / 2, 500.0, np.radians(60.0), 0.0, 0.0, 0.0), 6))
+    -0.004
     """
     unit = disturbance(1.0, elevation, azimuth)
     level = np.einsum("...ij,...j->...i", level_matrix(roll, pitch), unit)

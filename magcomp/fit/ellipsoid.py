@@ -51,7 +51,15 @@ class Ellipsoids:
 
 
 def fit_ellipsoid(raw: FloatArray, strength: float) -> Ellipsoids:
-    """Robust ellipsoid through readings; see :func:`fit_ellipsoids`."""
+    """Robust ellipsoid through readings; see :func:`fit_ellipsoids`.
+
+    Examples
+    --------
+    >>> turned = np.random.default_rng(1).normal(size=(200, 3))
+    >>> field = 500.0 * turned / np.linalg.norm(turned, axis=1)[:, None]
+    >>> fit_ellipsoid(field + [100.0, -40.0, 20.0], 500.0).centres.round(3).tolist()
+    [[100.0, -40.0, 20.0]]
+    """
     return fit_ellipsoids(raw, np.zeros(len(raw), dtype=np.intp), strength)
 
 

@@ -35,7 +35,13 @@ def unpack(parameters: FloatArray) -> Correction:
 
 
 def symmetric(six: FloatArray) -> FloatArray:
-    """Symmetric 3×3 matrix from xx, yy, zz, xy, xz, yz."""
+    """Symmetric 3×3 matrix from xx, yy, zz, xy, xz, yz.
+
+    Examples
+    --------
+    >>> symmetric(np.array([1.0, 2.0, 3.0, 0.1, 0.2, 0.3])).tolist()
+    [[1.0, 0.1, 0.2], [0.1, 2.0, 0.3], [0.2, 0.3, 3.0]]
+    """
     matrix = np.empty((3, 3))
     matrix[_ROWS, _COLUMNS] = six
     matrix[_COLUMNS, _ROWS] = six

@@ -168,6 +168,16 @@ def test_the_battery_is_the_one_the_vehicle_multiplies(recorded, switch, battery
     assert list(found.other_currents) == [1 - battery]
 
 
+def test_a_first_battery_without_a_sensor_leaves_the_second(recorded) -> None:
+    writer = Writer(parameters={"CAL_MAG_COMP_TYP": 0})
+    for n in range(20):
+        writer.row("battery_status", n / 5, 12.0, -1.0, instance=0)
+        writer.row("battery_status", n / 5, 24.0, 50.0 + n, instance=1)
+    found = recorded(writer)
+    assert (found.battery, found.other_currents) == (1, {})
+    assert found.voltage.value[0] == 24.0
+
+
 @pytest.mark.parametrize(
     ("release", "first"), [(0x010D00FF, 0.7), (0x010F02FF, 0.5), (0x00000000, 0.7)]
 )
