@@ -41,6 +41,7 @@ COMMANDS = {
     "record": _Command("magcomp.cli.record", "Record a live vehicle into a .tlog."),
     "upload": _Command("magcomp.cli.upload", "Write a parameter file to a vehicle, and prove it."),
     "restore": _Command("magcomp.cli.restore", "Bring a vehicle back to a backup."),
+    "fleet": _Command("magcomp.cli.fleet", "Fit a fleet's logs; tell what needs attention."),
     "simulate": _Command("magcomp.cli.simulate", "Run a simulated vehicle to try everything on."),
     "tui": _Command("magcomp.cli.tui", "Do all of it on one screen of the terminal."),
     "demo": _Command("magcomp.cli.demo", "Show the whole job on a simulated vehicle."),
@@ -113,6 +114,8 @@ def run(arguments: list[str]) -> int:
     except Exception as error:
         sentence, code, foreseen = _explain(error)
         complain(sentence)
+        for note in getattr(error, "__notes__", ()):
+            complain(note)
         if not foreseen and ("--debug" in arguments or os.environ.get("MAGCOMP_DEBUG")):
             traceback.print_exception(error)
         return code

@@ -37,7 +37,16 @@ from magcomp.fit.field_model import (
     lags_of,
     strength_and_dip,
 )
-from magcomp.fit.robust import ROUNDS, Estimate, Prior, one_step, solve, spread_of, time_blocks
+from magcomp.fit.robust import (
+    ROUNDS,
+    Estimate,
+    Prior,
+    one_step,
+    recorded_time,
+    solve,
+    spread_of,
+    time_blocks,
+)
 from magcomp.model import (
     CORRECTION_SIZE,
     MOTOR,
@@ -263,7 +272,7 @@ def _with_lags_held(known: Prior) -> Prior:
 
 def drift_blocks(time: FloatArray) -> IntArray:
     """Blocks as long as the drift of sensors and attitude, a dozen of them at least."""
-    duration = float(time[-1] - time[0]) if len(time) else 0.0
+    duration = float(recorded_time(time)[-1]) if len(time) else 0.0
     return time_blocks(time, float(np.clip(duration / _LEAST_BLOCKS, BLOCK_S, DRIFT_S)))
 
 

@@ -11,7 +11,7 @@ from textual.binding import Binding, BindingType
 from textual.containers import Horizontal, Vertical, VerticalScroll
 from textual.screen import ModalScreen
 from textual.widget import Widget
-from textual.widgets import Button, Input, Label, Markdown, Static
+from textual.widgets import Button, Input, Label, Static
 
 Answer = TypeVar("Answer")
 
@@ -221,6 +221,8 @@ class Help(Dialog[None]):
 
     def compose(self) -> ComposeResult:
         """The text in a scroll."""
+        from textual.widgets import Markdown  # noqa: PLC0415 - its parser is slow to import
+
         with Vertical(classes="dialog tall") as dialog:
             dialog.border_title = "Help"
             dialog.border_subtitle = "Esc closes"
