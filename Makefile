@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 
-.PHONY: demo test test-all check lint benchmark clean
+.PHONY: demo test test-all coverage check lint lock benchmark clean
 
 demo: $(VENV)/installed
 	@$(BIN)/magcomp demo
@@ -15,6 +15,9 @@ test: $(VENV)/installed-dev lint
 test-all: $(VENV)/installed-dev lint
 	@$(BIN)/python -m pytest -n 2 -q
 
+coverage: $(VENV)/installed-dev
+	@$(BIN)/python -m pytest -n 2 -q -m "not slow" --cov --cov-report=term
+
 lint: $(VENV)/installed-dev
 	@$(BIN)/ruff check magcomp tests benchmarks examples
 	@$(BIN)/ruff format --check magcomp tests benchmarks examples
@@ -22,6 +25,11 @@ lint: $(VENV)/installed-dev
 	@$(BIN)/lint-imports
 
 check: lint
+
+# Needs uv. The lock is what hosted CI installs; `make test` takes what pyproject.toml allows.
+lock:
+	@uv pip compile pyproject.toml --extra dev --universal --python-version 3.11 --generate-hashes \
+	  --no-annotate --quiet -o requirements-dev.lock
 
 benchmark: $(VENV)/installed-dev
 	@$(BIN)/python benchmarks/accuracy.py

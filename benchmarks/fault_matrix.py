@@ -11,12 +11,16 @@ false claims
 not restored
     `restore` did not bring every value back.
 
+PX4 is the small one of the tests (tests/writing/fake_px4.py), which holds and saves parameters as
+PX4 does.
+
     python benchmarks/fault_matrix.py [STEP]
 """
 
 from __future__ import annotations
 
 import contextlib
+import importlib
 import sys
 import tempfile
 import time
@@ -41,6 +45,11 @@ from magcomp.writing.plan import plan
 
 SEED = 1
 STORAGE_S = 0.9
+TESTS = Path(__file__).resolve().parent.parent / "tests" / "writing"
+TITLE = (
+    f"{'fault':<32}{'cases':>6}{'half-written':>14}{'false claims':>14}{'not restored':>14}"
+    f"{'old/new/off':>16}{'longest':>9}"
+)
 NAMES = [
     f"COMPASS_{kind}{compass}_{axis}"
     for compass in ("", "2", "3")
@@ -229,16 +238,46 @@ def main() -> None:
     step = int(sys.argv[1]) if len(sys.argv) > 1 else 10
     with mock.patch("os.fsync"):  # the disk is not what is measured
         measure(step)
+        measure_px4(step)
+
+
+def measure_px4(step: int) -> None:
+    """Put the faults to the PX4 of the tests."""
+    sys.path.insert(0, str(TESTS))
+    faults = importlib.import_module("px4_faults")  # in the folder of the tests
+    messages, seconds = faults.clean_messages()
+    print(f"PX4: {messages} messages, {seconds:.1f} s clean")
+    print(TITLE)
+    for kind, fault in faults.FAULTS.items():
+        begun, counts, longest = time.monotonic(), [0, 0, 0], 0.0
+        stood: Counter[str] = Counter()
+        cases = range(0, messages, step)
+        for at in cases:
+            with tempfile.TemporaryDirectory() as name:
+                case = faults.strike(fault, at, Path(name))
+            counts = [count + one for count, one in zip(counts, case.bad, strict=True)]
+            stood[case.stands] += 1
+            longest = max(longest, case.seconds)
+        tell(kind, len(cases), counts, stood, longest, time.monotonic() - begun)
+
+
+def tell(
+    kind: str, cases: int, counts: list[int], stood: Counter[str], longest: float, work: float
+) -> None:
+    """Print a line of the table."""
+    shares = "/".join(str(stood[word]) for word in ("old", "new", "off"))
+    print(
+        f"{kind:<32}{cases:>6}{counts[0]:>14}{counts[1]:>14}{counts[2]:>14}"
+        f"{shares:>16}{longest:>7.0f} s   ({work:.0f} s of work)",
+        flush=True,
+    )
 
 
 def measure(step: int) -> None:
     with tempfile.TemporaryDirectory() as name:
         clean = Case(Faults(), Path(name))
     print(f"ArduPilot: {clean.counted} messages, {clean.told} events, {clean.seconds:.1f} s clean")
-    print(
-        f"{'fault':<32}{'cases':>6}{'half-written':>14}{'false claims':>14}{'not restored':>14}"
-        f"{'old/new/off':>16}{'longest':>9}"
-    )
+    print(TITLE)
     for kind, made in KINDS.items():
         begun, counts, longest = time.monotonic(), [0, 0, 0], 0.0
         stood: Counter[str] = Counter()
@@ -252,12 +291,7 @@ def measure(step: int) -> None:
             counts = [count + one for count, one in zip(counts, bad, strict=True)]
             stood[word] += 1
             longest = max(longest, case.seconds)
-        shares = "/".join(str(stood[word]) for word in ("old", "new", "off"))
-        print(
-            f"{kind:<32}{len(cases):>6}{counts[0]:>14}{counts[1]:>14}{counts[2]:>14}"
-            f"{shares:>16}{longest:>7.0f} s   ({time.monotonic() - begun:.0f} s of work)",
-            flush=True,
-        )
+        tell(kind, len(cases), counts, stood, longest, time.monotonic() - begun)
 
 
 if __name__ == "__main__":

@@ -2,12 +2,14 @@
 
     python benchmarks/read.py [LOG...]
 
-All read the same messages of the same file, one after the other, again and again; the medians are
-compared. magcomp makes a Recording of them, with parameters, time axis and quantities; the others
-only decode. Then logs several times as long show that time and memory grow with them.
+All read the same messages of the same file, one after the other, again and again; the medians of
+the processor's time are compared, so that a busy machine does not decide. magcomp makes a Recording
+of them, with parameters, time axis and quantities; the others only decode. Then logs several times
+as long show that time and memory grow with them.
 
     .tlog   against pymavlink and, where installed, fasttlogparser
     .BIN    against pymavlink's DFReader
+    .ulg    against pyulog, told which topics to take
 
 fasttlogparser is a C++ package that magcomp does not need. To compare with it:
     .venv/bin/pip install scikit-build-core pybind11
@@ -31,10 +33,12 @@ from statistics import median
 from pymavlink import mavutil
 from pymavlink.dialects.v20.ardupilotmega import PROTOCOL_MARKER_V2, mavlink_map
 from pymavlink.generator.mavcrc import x25crc
+from pyulog import ULog
 
 from magcomp.mavlink.messages import Message
 from magcomp.sources import read
 from magcomp.sources.dataflash.quantities import MESSAGES as DATAFLASH_MESSAGES
+from magcomp.sources.ulog import TOPICS
 
 TLOG_MESSAGES = [message.name for message in Message]
 FIXTURES = Path(__file__).parents[1] / "sitl_fixtures"
@@ -44,6 +48,7 @@ DEFAULT = [
     FIXTURES / "turntable_five_levels.tlog",
     FIXTURES / "flight.BIN",
     *REAL.glob("quad_cube_4.5.7.BIN"),
+    *REAL.glob("px4_quad.ulg"),
 ]
 GROWTH = (1, 4, 24)
 ROUNDS = 15
@@ -54,6 +59,10 @@ FLIGHT_US = 300_000_000
 
 def with_magcomp(path: Path) -> None:
     read(path)
+
+
+def with_pyulog(path: Path) -> None:
+    ULog(str(path), list(TOPICS), disable_str_exceptions=True)
 
 
 def with_pymavlink(path: Path) -> None:
@@ -90,10 +99,10 @@ def fasttlogparser_readers() -> dict[str, Callable[[Path], None]]:
 
 
 def seconds(reader: Callable[[Path], None], path: Path) -> float:
-    begin = time.perf_counter()
+    begin = time.process_time()
     with silence():
         reader(path)
-    return time.perf_counter() - begin
+    return time.process_time() - begin
 
 
 @contextlib.contextmanager
@@ -112,16 +121,21 @@ def silence() -> Iterator[None]:
 
 def compare(path: Path, others: dict[str, Callable[[Path], None]]) -> None:
     readers = {"magcomp": with_magcomp, **others}
-    taken: dict[str, list[float]] = {name: [] for name in (*readers, "pymavlink")}
+    peer, with_peer = ("pyulog", with_pyulog) if _is_ulog(path) else ("pymavlink", with_pymavlink)
+    taken: dict[str, list[float]] = {name: [] for name in (*readers, peer)}
     for number in range(ROUNDS):
         for name, reader in readers.items():
             taken[name].append(seconds(reader, path))
         if number < SLOW_ROUNDS:
-            taken["pymavlink"].append(seconds(with_pymavlink, path))
+            taken[peer].append(seconds(with_peer, path))
     ours = median(taken["magcomp"])
     print(f"{path}, {path.stat().st_size / 1e6:.2f} MB")
     for name, times in taken.items():
         print(f"  {name:30s} {1e3 * median(times):9.1f} ms   {median(times) / ours:6.1f} x magcomp")
+
+
+def _is_ulog(path: Path) -> bool:
+    return path.suffix == ".ulg"
 
 
 def growth(path: Path, again: Callable[[bytes, int], bytes]) -> None:

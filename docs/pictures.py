@@ -64,7 +64,7 @@ async def fly_and_write(app: MagcompApp, keep: Callable[[str], None]) -> None:
     await connect(app)
     keep("tui-connect")
     app.action_go("record")
-    await until(lambda: app.live and app.live.guidance.share_done > 0.8)
+    await until(lambda: app.live and app.live.bound and app.live.guidance.share_done > 0.6)
     keep("tui-record")
     app.action_light()
     await asyncio.sleep(0.5)
@@ -82,9 +82,6 @@ async def fly_and_write(app: MagcompApp, keep: Callable[[str], None]) -> None:
     keep("tui-write")
     app.action_go("verify")
     app.action_fly_again()
-    await until(lambda: app.live and app.live.armed)
-    await asyncio.sleep(6.0)
-    app.screen.action_mark()
     await until(lambda: app.writing.measured)
     keep("tui-verify")
 

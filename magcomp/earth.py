@@ -76,6 +76,12 @@ def expected_field(
     ------
     InputError
         For a position that is not on the earth, or an altitude that is not a number.
+
+    Examples
+    --------
+    >>> earth = expected_field(47.4, 8.5, 500.0, 1_700_000_000.0)
+    >>> round(earth.strength), round(float(np.degrees(earth.dip)))
+    (483, 63)
     """
     if not (abs(latitude_deg) <= 90.0 and abs(longitude_deg) <= 360.0):
         raise InputError(

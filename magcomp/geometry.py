@@ -12,7 +12,13 @@ FloatArray = NDArray[np.float64]
 
 
 def wrap_angle(angle: ArrayLike) -> FloatArray:
-    """Bring angles in radians into [−π, π)."""
+    """Bring angles in radians into [−π, π).
+
+    Examples
+    --------
+    >>> float(np.degrees(wrap_angle(np.radians(350.0))).round(9))
+    -10.0
+    """
     return (np.asarray(angle, dtype=np.float64) + np.pi) % (2 * np.pi) - np.pi
 
 
@@ -30,7 +36,14 @@ def level_matrix(roll: ArrayLike, pitch: ArrayLike) -> FloatArray:
 
     Notes
     -----
-    PAPER.md equation 1.
+    docs/method.md, Equation 1.
+
+    Examples
+    --------
+    A vehicle that leans 90° to the right has its right side where down was:
+
+    >>> level_matrix(np.pi / 2, 0.0).round(9) @ [0.0, 1.0, 0.0]
+    array([0., 0., 1.])
     """
     roll, pitch = np.broadcast_arrays(np.asarray(roll, float), np.asarray(pitch, float))
     sin_roll, cos_roll = np.sin(roll), np.cos(roll)
@@ -47,7 +60,13 @@ def level_matrix(roll: ArrayLike, pitch: ArrayLike) -> FloatArray:
 
 
 def gravity_direction(roll: ArrayLike, pitch: ArrayLike) -> FloatArray:
-    """Unit vector pointing down, in body axes, shape (..., 3): the last row of C(φ,θ)."""
+    """Unit vector pointing down, in body axes, shape (..., 3): the last row of C(φ,θ).
+
+    Examples
+    --------
+    >>> gravity_direction(0.0, np.radians(30.0)).round(3).tolist()
+    [-0.5, 0.0, 0.866]
+    """
     return level_matrix(roll, pitch)[..., 2, :]
 
 
@@ -56,7 +75,14 @@ def body_from_earth(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> FloatA
 
     Notes
     -----
-    Level axes turned by the heading: C(φ,θ)ᵀ · R_z(ψ)ᵀ, PAPER.md equation 1.
+    Level axes turned by the heading: C(φ,θ)ᵀ · R_z(ψ)ᵀ, docs/method.md, Equation 1.
+
+    Examples
+    --------
+    Heading east, the earth's north lies to the left:
+
+    >>> (body_from_earth(0.0, 0.0, np.pi / 2) @ [1.0, 0.0, 0.0]).round(9).tolist()
+    [0.0, -1.0, 0.0]
     """
     yaw = np.asarray(yaw, float)
     cos_yaw, sin_yaw = np.cos(yaw), np.sin(yaw)
@@ -88,7 +114,14 @@ def heading(
 
     Notes
     -----
-    PAPER.md equation 2.
+    docs/method.md, Equation 2.
+
+    Examples
+    --------
+    A field that points to the left of a level vehicle: it looks east.
+
+    >>> float(np.degrees(heading([0.0, -200.0, 400.0], 0.0, 0.0)))
+    90.0
     """
     level = np.einsum("...ij,...j->...i", level_matrix(roll, pitch), np.asarray(field, float))
     return wrap_angle(np.arctan2(-level[..., 1], level[..., 0]) + declination)
@@ -108,7 +141,14 @@ def heading_shift(
 
     Notes
     -----
-    PAPER.md equation 7.
+    docs/method.md, Equation 7.
+
+    Examples
+    --------
+    10 mGauss to the right of a horizontal field of 200 mGauss turn the heading by 1/20:
+
+    >>> float(heading_shift([0.0, 10.0, 0.0], [200.0, 0.0, 400.0], 0.0, 0.0))
+    -0.05
     """
     level = level_matrix(roll, pitch)
     shift = np.einsum("...ij,...j->...i", level, np.asarray(disturbance, float))

@@ -2,8 +2,17 @@
 
 from __future__ import annotations
 
+import sys
+
 from hypothesis import settings
 
 # A busy machine is slow, not wrong: no test here is about the time of one example.
 settings.register_profile("magcomp", deadline=None)
 settings.load_profile("magcomp")
+
+# Serial ports and terminals are played by pseudo-terminals, which Windows has not.
+collect_ignore = (
+    ["cli/test_cli_process.py", "link/test_link_connection.py", "link/test_link_transports.py"]
+    if sys.platform == "win32"
+    else []
+)

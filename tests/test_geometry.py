@@ -1,4 +1,4 @@
-"""Levelling, heading and rotations: PAPER.md equations 1, 2 and 7 to 11, against each other."""
+"""Levelling, heading and rotations against each other: docs/method.md, Equations 1 to 11."""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
 """What a recording's .json says about its vehicle, and what parameters leave of heading error.
 
 Everything here is computed from the truth and from parameters alone, the way the
-autopilot would use them (AUTOPILOTS.md); nothing of magcomp's fits or judges is used.
+autopilot would use them (docs/autopilots.md, ArduPilot: correction); nothing of
+magcomp's fits or judges is used.
 """
 
 from __future__ import annotations

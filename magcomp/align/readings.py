@@ -8,7 +8,7 @@ import numpy as np
 
 from magcomp import autopilots
 from magcomp.autopilots import Kind
-from magcomp.errors import MissingDataError
+from magcomp.errors import MissingDataError, UsageError
 from magcomp.model import (
     Applied,
     BoolArray,
@@ -45,12 +45,15 @@ def readings(
     ------
     MissingDataError
         Without this compass, without attitude, or with no reading left between start and end.
+    UsageError
+        Where the recording ends before the start, or begins after the end.
     ParameterFileError
         Where a compass parameter of the recording is not finite.
 
     Notes
     -----
-    ArduPilot repeats a reading until the next one (AUTOPILOTS.md, Timing): only changes are new.
+    ArduPilot repeats a reading until the next one: only changes are new (docs/autopilots.md,
+    ArduPilot: timing).
     """
     reported = recording.field.get(compass)
     if reported is None:
@@ -63,8 +66,8 @@ def readings(
             f"{recording.source} must hold the vehicle's attitude (message ATTITUDE); "
             "instead it holds none, and gravity cannot be known without it"
         )
-    keep = is_new(reported.value)
-    keep &= (reported.time >= start) & (reported.time <= end)
+    asked = _within_span(recording, reported.time, start, end)
+    keep = is_new(reported.value) & asked
     autopilot = autopilots.of(recording)
     applied = recording.applied.get(compass)
     corrected = compass not in recording.raw_compasses
@@ -78,7 +81,7 @@ def readings(
     if not keep.any():
         raise MissingDataError(
             f"{recording.source} must hold usable readings of compass {compass} in the time "
-            f"asked for; instead all {len(reported)} were repeats, gaps or outside it"
+            f"asked for; instead {_unusable(int(asked.sum()), len(reported))}"
         )
     time = reported.time[keep]
     in_force, stretch = _corrections(recording, compass, time, changes)
@@ -102,6 +105,26 @@ def readings(
     )
 
 
+def _within_span(recording: Recording, time: FloatArray, start: float, end: float) -> BoolArray:
+    """Which moments lie in the time asked for, which must meet the recording's own."""
+    duration = recording.duration_s
+    if start > duration:
+        raise UsageError(
+            f"The start must be before the log ends at {duration:.0f} s; instead received "
+            f"{start:g} s"
+        )
+    if end < 0.0:
+        raise UsageError(f"The end must be after the log begins at 0 s; instead received {end:g} s")
+    return np.asarray((time >= start) & (time <= end))
+
+
+def _unusable(asked: int, all_: int) -> str:
+    """In words, why no reading is left of those in the time asked for."""
+    if not asked:
+        return f"none of its {all_} is in that time"
+    return f"all {asked} of that time were repeats, in gaps of the attitude, or taken disarmed"
+
+
 def within(readings: Readings, known: Series) -> Readings:
     """The readings at times where another quantity is known, not interpolated across a gap."""
     inside = ~_in_gap(readings.time, known.time)
@@ -114,7 +137,13 @@ def _list_compasses(recording: Recording) -> str:
 
 
 def is_new(value: FloatArray) -> BoolArray:
-    """Whether each reading, shape (n, 3), differs from the one before it; shape (n,)."""
+    """Whether each reading, shape (n, 3), differs from the one before it; shape (n,).
+
+    Examples
+    --------
+    >>> is_new(np.array([[1.0, 2.0, 3.0], [1.0, 2.0, 3.0], [1.0, 2.0, 4.0]])).tolist()
+    [True, False, True]
+    """
     changed = np.any(np.diff(value, axis=0) != 0.0, axis=1)
     return np.concatenate([[True], changed])
 

@@ -36,7 +36,8 @@ def sample(
 
     Notes
     -----
-    raw = soft_iron⁻¹ · (corrected − MOT · u) − OFS, AUTOPILOTS.md "Undo".
+    raw = soft_iron⁻¹ · (corrected − MOT · u) − OFS, undone
+    as in docs/autopilots.md, ArduPilot: correction.
     """
     measured = readings.time - lags.field
     commanded = readings.time - lags.regressor
@@ -65,7 +66,13 @@ def sample(
 
 
 def interpolate(series: Series, time: FloatArray) -> FloatArray:
-    """A series at other times, linearly; shape (n,) or (n, k)."""
+    """A series at other times, linearly; shape (n,) or (n, k).
+
+    Examples
+    --------
+    >>> interpolate(Series(np.array([0.0, 1.0]), np.array([10.0, 20.0])), np.array([0.25])).tolist()
+    [12.5]
+    """
     if series.value.ndim == 1:
         return np.asarray(np.interp(time, series.time, series.value))
     return np.stack([np.interp(time, series.time, column) for column in series.value.T], axis=1)

@@ -6,9 +6,21 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from magcomp import __version__, autopilots
 from magcomp.autopilots import Autopilot, Kind
-from magcomp.model import Analysis, CompassResult, Grade, MotorFit, ParameterSet, Recording
+from magcomp.model import (
+    CURRENT,
+    Analysis,
+    CompassResult,
+    Grade,
+    MotorFit,
+    ParameterSet,
+    Recording,
+)
+
+_IDLE_SHARE = 0.1
 
 
 @dataclass(frozen=True)
@@ -44,12 +56,13 @@ def emit(recording: Recording, fits: Sequence[MotorFit]) -> Mapping[int, Emissio
     fitted = [fit.compass for fit in fits]
     changed = not all(fit.kept for fit in fits)
     regressor = fits[0].regressor
+    usual = _usual(recording, regressor)
     switch = autopilot.switch_parameters(regressor, fitted, values, battery=recording.battery)
     return {
         fit.compass: Emission(
             accepted={
                 **(switch if changed else {}),
-                **_of_correction(autopilot, fit, values, in_force=not changed),
+                **_of_correction(autopilot, fit, values, usual, in_force=not changed),
             },
             left_out=autopilot.neutral_parameters(fit.compass, fit.regressor, values),
         )
@@ -57,8 +70,22 @@ def emit(recording: Recording, fits: Sequence[MotorFit]) -> Mapping[int, Emissio
     }
 
 
+def _usual(recording: Recording, regressor: str) -> float:
+    """The control quantity in ordinary flight: the median of what is above a tenth of the top."""
+    series = recording.current if regressor == CURRENT else recording.throttle
+    if series is None or not len(series):
+        return 0.0
+    working = series.value > _IDLE_SHARE * float(np.max(series.value))
+    return float(np.median(series.value[working])) if working.any() else 0.0
+
+
 def _of_correction(
-    autopilot: Autopilot, fit: MotorFit, values: Mapping[str, float], *, in_force: bool
+    autopilot: Autopilot,
+    fit: MotorFit,
+    values: Mapping[str, float],
+    usual: float,
+    *,
+    in_force: bool,
 ) -> dict[str, float]:
     """A correction's parameters; those of one that stays keep their stored values to the bit."""
     made = autopilot.correction_parameters(
@@ -67,6 +94,7 @@ def _of_correction(
         values,
         regressor=fit.regressor,
         soft_iron_fitted="diagonal" in fit.free and not fit.kept,
+        usual=usual,
     )
     if not fit.kept:
         return made

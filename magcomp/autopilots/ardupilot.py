@@ -1,4 +1,4 @@
-"""ArduPilot: every fact of it that magcomp needs (ArduCopter 4.6.3; docs/autopilots.md)."""
+"""Every fact of ArduPilot that magcomp needs: docs/autopilots.md, ArduPilot."""
 
 from __future__ import annotations
 
@@ -113,6 +113,8 @@ class ArduPilot:
     compass_prefix = "COMPASS_"
     device_id_names = tuple(single_name("DEV_ID", compass) for compass in NUMBERS)
     batteries = (0,)
+    first_slot_leads = True
+    first_compass_message = "RAW_IMU"
     storage_s = 1.0  # a queue of writes, each soon, and the memory's lines after it
     device_ids_describe = "bus, address and type of a sensor, which are alike in vehicles of a kind"
 
@@ -243,6 +245,7 @@ class ArduPilot:
         *,
         regressor: str,  # noqa: ARG002
         soft_iron_fitted: bool,
+        usual: float = 0.0,  # noqa: ARG002
     ) -> dict[str, float]:
         """COMPASS_OFS, DIA, ODI and MOT; COMPASS_SCALE stays as it is.
 

@@ -96,7 +96,15 @@ class Calibration:
 
 
 def soft_iron_matrix(diagonal: ArrayLike, off_diagonal: ArrayLike) -> FloatArray:
-    """D from COMPASS_DIA and COMPASS_ODI, shape (3, 3); the identity where DIA is all zero."""
+    """D from COMPASS_DIA and COMPASS_ODI, shape (3, 3); the identity where DIA is all zero.
+
+    Examples
+    --------
+    >>> soft_iron_matrix([1.1, 1.0, 0.9], [0.01, 0.02, 0.03]).tolist()
+    [[1.1, 0.01, 0.02], [0.01, 1.0, 0.03], [0.02, 0.03, 0.9]]
+    >>> soft_iron_matrix([0.0, 0.0, 0.0], [0.01, 0.02, 0.03]).tolist()
+    [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+    """
     dx, dy, dz = np.asarray(diagonal, float)
     ox, oy, oz = np.asarray(off_diagonal, float)
     if dx == dy == dz == 0.0:

@@ -62,7 +62,8 @@ def left_out(parameters: ParameterHistory) -> dict[int, InputError]:
 
     Notes
     -----
-    COMPASS_PMOT_EN overrides COMPASS_MOTCT for compass 1 (AUTOPILOTS.md).
+    COMPASS_PMOT_EN overrides COMPASS_MOTCT for compass 1 (docs/autopilots.md,
+    ArduPilot: control quantity).
     """
     found: dict[int, InputError] = {}
     for number in NUMBERS:

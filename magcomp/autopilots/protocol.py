@@ -197,8 +197,18 @@ class Autopilot(Protocol):
         ...
 
     @property
+    def first_slot_leads(self) -> bool:
+        """Whether the heading comes from the compass of the first slot that is used."""
+        ...
+
+    @property
     def batteries(self) -> tuple[int, ...]:
         """Battery instances whose current the firmware can multiply."""
+        ...
+
+    @property
+    def first_compass_message(self) -> str:
+        """Telemetry message that carries the first compass."""
         ...
 
     @property
@@ -341,6 +351,7 @@ class Autopilot(Protocol):
         *,
         regressor: str,
         soft_iron_fitted: bool,
+        usual: float = 0.0,
     ) -> dict[str, float]:
         """Parameters that make this vehicle apply a correction.
 
@@ -352,6 +363,9 @@ class Autopilot(Protocol):
             The control quantity that the motor vector is multiplied by.
         soft_iron_fitted
             The soft iron is not the one in force, so it belongs to the offsets.
+        usual
+            The control quantity in ordinary flight; 0 where unknown. Where a firmware cannot take
+            a value over as it is, the field is right here.
         """
         ...
 

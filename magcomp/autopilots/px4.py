@@ -1,4 +1,4 @@
-"""PX4: every fact of it that magcomp needs (release/1.12 to 1.17)."""
+"""Every fact of PX4 that magcomp needs, release/1.12 to 1.17: docs/autopilots.md, PX4."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from magcomp.autopilots.protocol import (
     ThrustCurve,
 )
 from magcomp.autopilots.px4_correction import (
+    MGAUSS,
     REGRESSOR_OF,
     Calibration,
     Compensation,
@@ -62,6 +63,8 @@ FIRST_VERSION = (1, 12)
 
 _THRUST_CURVE = "THR_MDL_FAC"
 _LOW, _HIGH = 1000.0, 2000.0
+_LEAST_USUAL = {CURRENT: 1.0, THROTTLE: 0.05}
+"""With less in ordinary flight COMP cannot make up for anything."""
 _LOGGED = LagPriors(LagPrior(0.0, 0.05), LagPrior(0.0, 0.1))
 """A log stamps a reading with the moment of measurement."""
 _LINK = LagPriors(LagPrior(0.0, 0.1), LagPrior(0.0, 0.1))
@@ -102,6 +105,8 @@ class Px4:
     compass_prefix = "CAL_MAG"
     device_id_names = tuple(single_name("ID", number) for number in NUMBERS)
     batteries = (0, 1)
+    first_slot_leads = False
+    first_compass_message = "SCALED_IMU"
     storage_s = 2.5  # it saves all at once, 0.3 s after a change and not again for 2 s
     device_ids_describe = "bus, address and type of a sensor, which are alike in vehicles of a kind"
 
@@ -121,8 +126,8 @@ class Px4:
                 + (
                     "holds no parameters: give the .ulg of the same flight"
                     if not recording.parameters.names
-                    else "does not, so its firmware is older than 1.12 or its parameters are not "
-                    "whole: give the .ulg of a newer firmware"
+                    else "does not: its firmware is older than 1.12, or its parameters are not "
+                    "whole; update it and record again, or give the whole .ulg"
                 )
             )
 
@@ -217,6 +222,7 @@ class Px4:
         *,
         regressor: str,
         soft_iron_fitted: bool,
+        usual: float = 0.0,
     ) -> dict[str, float]:
         """COMP and OFF, and SCALE and ODIAG where fitted, such that the firmware notices them."""
         rotation = sensor_to_body(values, compass)
@@ -225,6 +231,10 @@ class Px4:
         if not soft_iron_fitted:
             wanted = _with_shape(wanted, present)
         made = noticed(wanted, present, offset_zone(values), rotation)
+        if usual >= _LEAST_USUAL[regressor]:
+            power = usual if regressor == THROTTLE else usual / MGAUSS
+            missed = (made.offset - wanted.offset) / power
+            made = replace(made, motor=made.motor + missed)
         found = _vector("COMP", compass, made.motor) | _vector("OFF", compass, made.offset)
         if soft_iron_fitted:
             found |= _vector("SCALE", compass, made.scale)

@@ -1,6 +1,6 @@
 """PX4's compass correction, forward and backward, and what of the parameters is in force.
 
-The order inside the autopilot (release/1.12 to 1.17, seen on running firmware 1.15)::
+The order inside the autopilot (docs/autopilots.md, PX4: correction)::
 
     corrected = R · S · ((sensor + P · COMP) − OFF)
 

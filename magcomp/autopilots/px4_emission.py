@@ -1,9 +1,12 @@
 """Parameters that bring a wanted calibration into force in spite of the firmware's dead zones.
 
+docs/autopilots.md, PX4: in force, and PX4: what is written.
+
 PX4 goes on with its old OFF, SCALE or ODIAG where the new one differs too little from it, and
 after a start with 0, 1 or 0 where the stored one differs too little from these. So a value that
 would not be noticed is either left at what is in force or moved past the zone, whichever turns
-the heading less, so that the same is in force whether the vehicle is restarted or not.
+the heading less, so that the same is in force whether the vehicle is restarted or not. COMP then
+makes up for what the offset misses at the current or thrust of ordinary flight.
 """
 
 from __future__ import annotations
@@ -49,7 +52,11 @@ def noticed(
         wanted.off_diagonal, (present.off_diagonal, zeros), SHAPE_ZONE, np.eye(3)
     )
     level = np.diag([1.0, 1.0, _TILT]) @ rotation
-    offset = _nearest(wanted.offset, (present.offset, AT_START.offset), zone, level)
+    aim = wanted.offset
+    if float(np.linalg.norm(aim - present.offset)) <= zone:
+        # Two estimates of one offset, and so near to each other neither is known to be better.
+        aim = (aim + present.offset) / 2
+    offset = _nearest(aim, (present.offset, AT_START.offset), zone, level)
     shaped = replace(wanted, offset=offset, scale=scale, off_diagonal=off_diagonal)
     # COMP is in front of the soft iron: what it does to the corrected field has to stay.
     return replace(shaped, motor=behind(shaped, wanted.soft_iron @ wanted.motor))

@@ -25,21 +25,26 @@ class _Command(NamedTuple):
 
 
 COMMANDS = {
-    "fit": _Command("magcomp.cli.fit", "Find the compensation in a log, judge it, write it."),
-    "check": _Command("magcomp.cli.check", "Judge the calibration in force; fit nothing."),
-    "info": _Command("magcomp.cli.info", "What a log holds, and what it lacks for a fit."),
+    "fit": _Command(
+        "magcomp.cli.fit", "Find the motors' shift in a log, judge it, write it to a file."
+    ),
+    "check": _Command("magcomp.cli.check", "Judge the calibration that a log was flown with."),
+    "info": _Command("magcomp.cli.info", "Show what a log holds, and what it lacks for a fit."),
     "report": _Command("magcomp.cli.report", "Fit a log and write a report to look at."),
-    "heading": _Command("magcomp.cli.heading", "Raw, corrected and gyro-fused heading of a log."),
-    "reproduce": _Command("magcomp.cli.reproduce", "Carry out the paper's experiments again."),
+    "heading": _Command(
+        "magcomp.cli.heading", "Show the heading raw, corrected and fused with the gyro."
+    ),
+    "reproduce": _Command("magcomp.cli.reproduce", "Reproduce the paper's experiments."),
     "calibrate": _Command(
         "magcomp.cli.calibrate", "Guide, record and fit a live vehicle; write the answer to it."
     ),
     "record": _Command("magcomp.cli.record", "Record a live vehicle into a .tlog."),
     "upload": _Command("magcomp.cli.upload", "Write a parameter file to a vehicle, and prove it."),
     "restore": _Command("magcomp.cli.restore", "Bring a vehicle back to a backup."),
-    "simulate": _Command("magcomp.cli.simulate", "Be a vehicle to try everything on."),
-    "tui": _Command("magcomp.cli.tui", "All of it on one screen, for a laptop in a field."),
-    "demo": _Command("magcomp.cli.demo", "The whole job on a simulated vehicle, proven."),
+    "fleet": _Command("magcomp.cli.fleet", "Fit a fleet's logs; tell what needs attention."),
+    "simulate": _Command("magcomp.cli.simulate", "Run a simulated vehicle to try everything on."),
+    "tui": _Command("magcomp.cli.tui", "Do all of it on one screen of the terminal."),
+    "demo": _Command("magcomp.cli.demo", "Show the whole job on a simulated vehicle."),
 }
 
 
@@ -109,6 +114,8 @@ def run(arguments: list[str]) -> int:
     except Exception as error:
         sentence, code, foreseen = _explain(error)
         complain(sentence)
+        for note in getattr(error, "__notes__", ()):
+            complain(note)
         if not foreseen and ("--debug" in arguments or os.environ.get("MAGCOMP_DEBUG")):
             traceback.print_exception(error)
         return code

@@ -67,7 +67,7 @@ class _Bench:
     help="How many times faster than real time it flies.",
 )
 def demo(seed: int, speed: float) -> ExitCode:
-    """Do the whole job on a simulated vehicle: record, fit, write, verify, and fly once more.
+    """Show the whole job on a simulated vehicle: record, fit, write, verify, and fly once more.
 
     The vehicle is a process of its own, reached over UDP as a real one is. The fit sees only
     what a ground station would; what it found is then compared with the simulated truth.

@@ -264,6 +264,9 @@ def _from_fused(found: _Answer) -> dict[str, HeadingAccuracy]:
     if made.fused is None:
         return {}
     known = np.isfinite(made.fused.value)
+    # A gyro that is told every few seconds cannot carry a heading.
+    if not known.any():
+        return {}
     unwrapped = np.unwrap(made.fused.value[known])
     fused = np.interp(made.time, made.fused.time[known], unwrapped)
     apart = {

@@ -44,7 +44,7 @@ def reproduce(
     force: bool,
     to_json: bool,
 ) -> ExitCode:
-    """Carry out the paper's experiments and print its Table 1 beside ours.
+    """Reproduce the paper's experiments and print its Table 1 beside ours.
 
     On a simulated vehicle, and on recordings made with ArduCopter's real firmware.
     """

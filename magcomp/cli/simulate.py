@@ -88,7 +88,7 @@ def simulate(
     signing_key: Path | None,
     system: int,
 ) -> ExitCode:
-    """Be an ArduCopter with three compasses, reached at ADDRESS (udpout:127.0.0.1:14550).
+    """Run a simulated copter with three compasses at ADDRESS (udpout:127.0.0.1:14550).
 
     ADDRESS may be udpout:HOST:PORT, udp:HOST:PORT, tcpin:HOST:PORT, tcp:HOST:PORT or pty. It
     waits for a ground station, carries out its programme, and is then disarmed and ready to be

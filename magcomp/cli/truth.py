@@ -61,7 +61,7 @@ class KnownTruth:
         Notes
         -----
         The sensor reads D⁻¹ · (field + interference · amperes) − OFS with the true D and OFS
-        (PAPER.md equation 3).
+        (docs/method.md, Equation 3).
         """
         latitude, longitude, altitude = self._home
         earth = expected_field(latitude, longitude, altitude, unix_s)

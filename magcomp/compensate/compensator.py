@@ -1,6 +1,6 @@
 """The correction in the air: read the control quantity, subtract the offset, level, take ψ.
 
-PAPER.md, "Air, always". One reading costs some thirty multiplications and
+docs/method.md, In the air. One reading costs some thirty multiplications and
 allocates nothing that outlives the call, so that it can run at sensor rate.
 """
 
@@ -35,8 +35,8 @@ class Compensator:
 
     Notes
     -----
-    corrected = M · reading + b + m · u, PAPER.md equation 6 with a centre that moves with the
-    control quantity u; then equations 1 and 2.
+    corrected = M · reading + b + m · u, with a centre that moves with the control
+    quantity u: docs/method.md, Equation 6; then Equations 1 and 2.
     """
 
     __slots__ = ("_bias", "_matrix", "_motor", "declination", "field")
@@ -73,8 +73,9 @@ class Compensator:
 
         Notes
         -----
-        The inverse of AUTOPILOTS.md's forward correction, followed by ``correction``; both are
-        affine in reading and u, so together they cost no more than one.
+        The inverse of what the autopilot did (docs/autopilots.md, ArduPilot: correction),
+        followed by ``correction``; both are affine in reading and u, so together they cost no more
+        than one.
         """
         if present.regressor not in (None, regressor):
             raise InputError(

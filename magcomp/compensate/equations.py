@@ -1,4 +1,4 @@
-"""How a disturbance that the motors make turns the heading: PAPER.md equations 8 to 11.
+"""How a disturbance that the motors make turns the heading: docs/method.md, Equations 8 to 11.
 
 Equations 1, 2 and 7 are in :mod:`magcomp.geometry`.
 """
@@ -30,7 +30,12 @@ def level_components(strength: ArrayLike, dip: ArrayLike, heading: ArrayLike) ->
 
     Notes
     -----
-    PAPER.md equation 8.
+    docs/method.md, Equation 8.
+
+    Examples
+    --------
+    >>> level_components(500.0, np.radians(60.0), 0.0).round(6).tolist()
+    [250.0, -0.0]
     """
     horizontal = np.asarray(strength, float) * np.cos(dip)
     return np.stack([horizontal * np.cos(heading), -horizontal * np.sin(heading)], axis=-1)
@@ -50,7 +55,12 @@ def level_heading_shift(
 
     Notes
     -----
-    PAPER.md equation 9.
+    docs/method.md, Equation 9.
+
+    Examples
+    --------
+    >>> float(level_heading_shift(0.0, 10.0, 200.0, 0.0, 0.0))
+    -0.05
     """
     along = np.cos(heading) * np.asarray(right, float) + np.sin(heading) * np.asarray(
         forward, float
@@ -72,7 +82,12 @@ def disturbance(size: ArrayLike, elevation: ArrayLike, azimuth: ArrayLike) -> Fl
 
     Notes
     -----
-    PAPER.md equation 10.
+    docs/method.md, Equation 10.
+
+    Examples
+    --------
+    >>> disturbance(10.0, np.radians(90.0), 0.0).round(9).tolist()
+    [0.0, 0.0, 10.0]
     """
     size = np.asarray(size, float)
     return np.stack(
@@ -107,8 +122,15 @@ def shift_per_size(
 
     Notes
     -----
-    PAPER.md equation 11: at a fixed attitude the shift is this times H_m, and H_m grows with
+    docs/method.md, Equation 11: at a fixed attitude the shift is this times H_m, and H_m grows with
     the control quantity.
+
+    Examples
+    --------
+    A disturbance to the right at heading north, where 250 mGauss are horizontal:
+
+    >>> float(np.round(shift_per_size(0.0, np.pi / 2, 500.0, np.radians(60.0), 0.0, 0.0, 0.0), 6))
+    -0.004
     """
     unit = disturbance(1.0, elevation, azimuth)
     level = np.einsum("...ij,...j->...i", level_matrix(roll, pitch), unit)

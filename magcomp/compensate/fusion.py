@@ -1,8 +1,8 @@
 """Compass and gyro fused to a final heading, by imufusion.
 
 The gyro carries the heading from instant to instant, the corrected compass
-pulls it slowly back. A compass reading is old when it arrives (AUTOPILOTS.md,
-Timing), so it is compared with the heading of the moment it was measured; at
+pulls it slowly back. A compass reading is old when it arrives (docs/autopilots.md,
+ArduPilot: timing), so it is compared with the heading of the moment it was measured; at
 60°/s the difference is several degrees.
 """
 

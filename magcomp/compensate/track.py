@@ -116,7 +116,7 @@ def track(
     return Track(
         compass=compass,
         time=samples.time - lags.field,
-        reported=heading(new.reported, roll, pitch, earth.declination),
+        reported=heading(problem.readings.reported, roll, pitch, earth.declination),
         corrected=corrected,
         fused=_fused(recording, samples, compensator, tuning, gravity),
         field_lag_s=lags.field,

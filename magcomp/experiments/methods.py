@@ -87,9 +87,10 @@ def corrections(recording: Recording, compass: int, earth: EarthField) -> Correc
 
     Notes
     -----
-    The paper's method: an ellipsoid for each control quantity on its own, the line of PAPER.md
-    14–16 through their centres, and along it the position of each centre's foot; the soft iron
-    is that of the classic correction on the ground, at control quantity 0.
+    The paper's method: an ellipsoid for each control quantity on its own, the line of
+    docs/method.md, Equations 14 to 16, through their centres, and along it the position of each
+    centre's foot; the soft iron is that of the classic correction on the ground, at control
+    quantity 0.
     """
     found = reported(controls(recording))
     problem = Problem(readings(recording, compass), found[CURRENT], found, earth)

@@ -1,4 +1,4 @@
-"""The paper's flights, Figs 8 and 9: one mission, without and with motor compensation."""
+"""One mission without and with motor compensation: docs/method.md, Figs 8 and 9."""
 
 from __future__ import annotations
 

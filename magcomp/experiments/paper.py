@@ -1,4 +1,4 @@
-"""What the paper reports, to stand beside what comes out here (PAPER.md, "The experiments")."""
+"""What the paper reports, to stand beside what comes out here (docs/method.md, Table 1)."""
 
 from __future__ import annotations
 

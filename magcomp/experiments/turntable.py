@@ -1,4 +1,4 @@
-"""The paper's turntable: Figs 3 to 7 and Table 1.
+"""The paper's turntable, Figs 3 to 7 and docs/method.md, Table 1.
 
 The vehicle is held and turned about z, y and x at each control quantity, then
 turned once more, level. The turns about three axes are what the corrections
@@ -231,7 +231,7 @@ def true_lag(samples: Samples, truth: Truth, earth: EarthField) -> float:
     Notes
     -----
     The lag at which a symmetric matrix, an offset and a motor vector, all free, explain the raw
-    field best (PAPER.md 3): it depends on none of the corrections that are compared.
+    field best (docs/method.md, Equation 3): it depends on none of the corrections compared.
     """
     u = samples.u
 

@@ -1,6 +1,6 @@
 """Ellipsoids of raw field: one shape, one or many centres.
 
-Every raw reading lies on |D · (raw − centre)| = F (PAPER.md 4–6). D is kept
+Every raw reading lies on |D · (raw − centre)| = F (docs/method.md, Equations 4 to 6). D is kept
 symmetric and positive definite, so the surface is an ellipsoid and nothing
 else; several levels of the control quantity share D and have a centre each.
 """
@@ -51,7 +51,15 @@ class Ellipsoids:
 
 
 def fit_ellipsoid(raw: FloatArray, strength: float) -> Ellipsoids:
-    """Robust ellipsoid through readings; see :func:`fit_ellipsoids`."""
+    """Robust ellipsoid through readings; see :func:`fit_ellipsoids`.
+
+    Examples
+    --------
+    >>> turned = np.random.default_rng(1).normal(size=(200, 3))
+    >>> field = 500.0 * turned / np.linalg.norm(turned, axis=1)[:, None]
+    >>> fit_ellipsoid(field + [100.0, -40.0, 20.0], 500.0).centres.round(3).tolist()
+    [[100.0, -40.0, 20.0]]
+    """
     return fit_ellipsoids(raw, np.zeros(len(raw), dtype=np.intp), strength)
 
 

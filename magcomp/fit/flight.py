@@ -5,7 +5,7 @@ at every attitude and every control quantity, and its part along gravity must be
 the earth's vertical part. Neither residual contains the heading, so an error of
 heading cannot leak in::
 
-    r₁ = |c| − F                (PAPER.md 4)
+    r₁ = |c| − F                (docs/method.md, Equation 4)
     r₂ = c · down − F sin(dip)
 
 Both lags are parameters like the others. How much is free follows from what the
@@ -38,7 +38,16 @@ from magcomp.fit.field_model import (
     rows_of,
     strength_and_dip,
 )
-from magcomp.fit.robust import ROUNDS, Estimate, Prior, one_step, solve, spread_of, time_blocks
+from magcomp.fit.robust import (
+    ROUNDS,
+    Estimate,
+    Prior,
+    one_step,
+    recorded_time,
+    solve,
+    spread_of,
+    time_blocks,
+)
 from magcomp.fit.wander import Posterior, Rows, mixed, posterior
 from magcomp.model import (
     CORRECTION_SIZE,
@@ -65,7 +74,7 @@ LEAN_WIDTH = 0.1
 """Radians of attitude error a radian of lean held for seconds."""
 
 LAG_MEAN_S, LAG_WIDTH_S, LAG_MOST_S = 0.08, 0.1, 0.6
-"""AUTOPILOTS.md, Timing: the field lags by 0.05–0.1 s, the current by something of that order."""
+"""The field and the current are late by some 0.1 s: docs/autopilots.md, ArduPilot: timing."""
 
 DIP_WIDTH = 0.02
 """The world model misses the sine of the local dip by about this much."""
@@ -305,9 +314,9 @@ def with_wander(problem: Problem, found: FlightEstimate, free: int) -> tuple[Fli
     likeliest = max(each, key=lambda groups: each[groups].evidence)
     if not is_physical(answer.parameters):
         answer = each[likeliest]
-    return replace(found, parameters=answer.parameters, covariance=answer.covariance), max(
-        likeliest, 1
-    ) if likeliest < 3 else len(GROUPS)
+    covariance = _SIZES_UNKNOWN**2 * answer.covariance
+    moved = 1 if likeliest == 1 else len(GROUPS)
+    return replace(found, parameters=answer.parameters, covariance=covariance), moved
 
 
 def _believed(problem: Problem, offset: float, soft_iron: float, *, is_open: bool) -> Prior:
@@ -326,7 +335,7 @@ def _with_lags_held(known: Prior) -> Prior:
 
 def drift_blocks(time: FloatArray) -> IntArray:
     """Blocks as long as the drift of sensors and attitude, a dozen of them at least."""
-    duration = float(time[-1] - time[0]) if len(time) else 0.0
+    duration = float(recorded_time(time)[-1]) if len(time) else 0.0
     return time_blocks(time, float(np.clip(duration / _LEAST_BLOCKS, BLOCK_S, DRIFT_S)))
 
 

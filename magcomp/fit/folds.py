@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from magcomp.fit.robust import time_blocks
+from magcomp.fit.robust import recorded_time, time_blocks
 from magcomp.model import FloatArray, IntArray
 
 FOLDS = 5
@@ -20,7 +20,12 @@ def folds(time: FloatArray, count: int = FOLDS) -> IntArray:
 
     Every fold gets about six blocks spread over the recording, so that none misses a whole
     manoeuvre and none is a neighbour of itself.
+
+    Examples
+    --------
+    >>> folds(np.arange(0.0, 300.0, 10.0)).tolist()[:8]
+    [0, 1, 2, 3, 4, 0, 1, 2]
     """
-    duration = float(time[-1] - time[0]) if len(time) else 0.0
+    duration = float(recorded_time(time)[-1]) if len(time) else 0.0
     length = max(_LEAST_BLOCK_S, duration / (count * _ROUNDS))
     return np.asarray(time_blocks(time, length) % count)

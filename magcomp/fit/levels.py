@@ -4,7 +4,7 @@ Readings at steady control quantities are grouped into levels. One soft-iron
 shape is shared by all levels and every level has a centre of its own
 (ellipsoid.py); the centres lie on a line in space (line.py), and the position
 along it, regressed on the control quantity, gives the offset at any control
-quantity (PAPER.md, "The algorithm").
+quantity (docs/method.md, The paper's algorithm).
 """
 
 from __future__ import annotations

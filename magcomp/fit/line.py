@@ -1,7 +1,7 @@
 """The line in space on which the ellipsoid centres lie, in three forms.
 
-- :func:`paper_line`: the paper's iteration exactly, PAPER.md 14–16. It has no
-  answer for a line perpendicular to z, lets constants of its design matrix
+- :func:`paper_line`: the paper's iteration exactly (docs/method.md, Equations 14 to 16). It has
+  no answer for a line perpendicular to z, lets constants of its design matrix
   move, and treats all errors as equal.
 - :func:`orthogonal_line`: through the centroid along the first principal
   direction: the most probable line for equal errors in every direction.
@@ -65,8 +65,14 @@ def paper_line(centres: FloatArray, *, threshold: float = 1e-9, most: int = 20_0
 
     Notes
     -----
-    PAPER.md 13 (the form), 14 (V = B·ξ − L), 15 (B̂ᵀB̂·ξ = B̂ᵀL with the observed L),
-    16 ((E + ξξᵀ)·B̂ᵀ = Bᵀ + ξLᵀ). As in 16, every element of B̂ may move.
+    docs/method.md, Equations 13 to 16: the form, V = B·ξ − L, B̂ᵀB̂·ξ = B̂ᵀL with the observed L,
+    and (E + ξξᵀ)·B̂ᵀ = Bᵀ + ξLᵀ. As in 16, every element of B̂ may move.
+
+    Examples
+    --------
+    >>> line = paper_line(np.array([[0.0, 0.0, 0.0], [2.0, 1.0, 2.0], [4.0, 2.0, 4.0]]))
+    >>> line.direction.round(3).tolist()
+    [0.667, 0.333, 0.667]
     """
     centres = _checked(centres)
     count = len(centres)
@@ -103,6 +109,14 @@ def orthogonal_line(centres: FloatArray, weights: FloatArray | None = None) -> S
         Shape (k, 3), k ≥ 2.
     weights
         Shape (k,); equal by default.
+
+    Examples
+    --------
+    A line perpendicular to z, which the paper's form does not have:
+
+    >>> line = orthogonal_line(np.array([[0.0, 0.0, 5.0], [3.0, 4.0, 5.0], [6.0, 8.0, 5.0]]))
+    >>> np.abs(line.direction).round(9).tolist()
+    [0.6, 0.8, 0.0]
     """
     centres = _checked(centres)
     weights = np.ones(len(centres)) if weights is None else weights
@@ -124,8 +138,17 @@ def weighted_line(centres: FloatArray, covariances: FloatArray) -> SpaceLine:
     Notes
     -----
     Minimises Σ (xₖ − P − tₖ d)ᵀ Σₖ⁻¹ (xₖ − P − tₖ d) over P, d and every tₖ, in turn: the
-    positions for a given line, then the line for given positions (PAPER.md, "What an engineer
-    must know": constants exact, one z, each centre with its own covariance).
+    positions for a given line, then the line for given positions (docs/method.md, Three
+    lines).
+
+    Examples
+    --------
+    A centre known badly hardly moves the line:
+
+    >>> centres = np.array([[0.0, 0.0, 0.0], [1.0, 5.0, 0.0], [2.0, 0.0, 0.0]])
+    >>> known = np.array([np.eye(3), 1e6 * np.eye(3), np.eye(3)])
+    >>> np.abs(weighted_line(centres, known).direction).round(3).tolist()
+    [1.0, 0.0, 0.0]
     """
     centres = _checked(centres)
     precision: FloatArray = np.asarray(np.linalg.inv(covariances), dtype=np.float64)
@@ -166,9 +189,8 @@ def line_through(levels: tuple[Level, ...]) -> Line:
 
     Notes
     -----
-    PAPER.md: "The line alone carries no control quantity. The position along it must be
-    regressed on the control quantity, which has error of its own": York's regression with both
-    errors, position on u.
+    York's regression with errors of both, position on u (docs/method.md, Position along the
+    line).
     """
     centres = np.stack([level.centre for level in levels])
     covariances = np.stack([level.covariance for level in levels])
@@ -215,6 +237,13 @@ def regress_with_errors(
     -----
     The effective-variance form: weights 1 / (σ_y² + slope² σ_x²), iterated, with x replaced by
     its most probable value as in York (1966).
+
+    Examples
+    --------
+    >>> x, alike = np.array([0.0, 1.0, 2.0]), np.full(3, 0.01)
+    >>> slope, intercept, _ = regress_with_errors(x, alike, 1.0 + 2.0 * x, alike)
+    >>> round(slope, 6), round(intercept, 6)
+    (2.0, 1.0)
     """
     slope = float(np.polyfit(x, y, 1)[0])
     for _ in range(_ITERATIONS):

@@ -29,6 +29,7 @@ _MAD_TO_STD = 1.4826
 _STEPS = 12
 _DAMPING_START = 1e-6
 _DAMPING_MOST = 1e3
+_GAP_S, _GAP_STEPS = 2.0, 5.0
 _NEGLIGIBLE = 1e-3
 """A gain of log-likelihood that no digit of the answer notices."""
 
@@ -185,7 +186,15 @@ def _columns(slopes: FloatArray, moving: BoolArray) -> FloatArray:
 
 
 def spread_of(values: FloatArray, floor: float) -> FloatArray:
-    """Robust σ of each kind of residual, shape (g,), and at least the rounding of the readings."""
+    """Robust σ of each kind of residual, shape (g,), and at least the rounding of the readings.
+
+    Examples
+    --------
+    One reading far out does not widen it:
+
+    >>> spread_of(np.array([[-1.0], [1.0], [-1.0], [1.0], [500.0]]), 0.1).round(4).tolist()
+    [1.4826]
+    """
     return np.maximum(_MAD_TO_STD * np.median(np.abs(values), axis=0), floor)
 
 
@@ -280,6 +289,24 @@ def _covariance(
     return covariance
 
 
+def recorded_time(time: FloatArray) -> FloatArray:
+    """Seconds of recording up to each moment, shape (n,): what a gap lasts does not count.
+
+    A clock that jumps by an hour, or a link that was lost for one, says nothing.
+    """
+    steps = np.diff(time)
+    if not len(steps):
+        return np.zeros(len(time))
+    longest = max(_GAP_S, _GAP_STEPS * float(np.median(steps)))
+    return np.concatenate([[0.0], np.cumsum(np.minimum(steps, longest))])
+
+
 def time_blocks(time: FloatArray, seconds: float) -> IntArray:
-    """Number of the block of ``seconds`` each moment falls into, shape (n,)."""
-    return np.asarray(np.floor((time - time[0]) / seconds), dtype=np.intp)
+    """Number of the block of ``seconds`` of recording each moment falls into, shape (n,).
+
+    Examples
+    --------
+    >>> time_blocks(np.array([10.0, 11.9, 12.0, 17.0]), 2.0).tolist()
+    [0, 0, 1, 3]
+    """
+    return np.asarray(np.floor(recorded_time(time) / seconds), dtype=np.intp)

@@ -94,8 +94,8 @@ def fit_sweep(problem: Problem, *, lag: float | None = None) -> MotorFit:
 
     Notes
     -----
-    PAPER.md 3 with the vehicle at rest: only the hard iron moves. AUTOPILOTS.md: "a slope g
-    found in raw space becomes MOT = −s · D · g".
+    docs/method.md, Sweeps: at rest only the hard iron moves. A slope g of the raw field becomes
+    MOT = −s · D · g (docs/autopilots.md, ArduPilot: correction).
     """
     begin = np.zeros(_SIZE)
     begin[_LAG] = _nearest_lag(problem) if lag is None else lag

@@ -68,8 +68,8 @@ def heading_errors(
 
     Notes
     -----
-    ``before`` is exact; ``after`` and ``p95`` use the first-order shift of PAPER.md 7 on draws
-    of all 12 parameters.
+    ``before`` is exact; ``after`` and ``p95`` use the first-order shift of docs/method.md,
+    Equation 7, on draws of all 12 parameters.
     """
     roll, pitch, yaw = attitudes()
     horizontal = np.sqrt(max(fit.strength**2 - fit.vertical**2, 1.0))
@@ -100,7 +100,14 @@ def heading_errors(
 def largest_shift(
     found: FloatArray, true: FloatArray, roll: FloatArray, pitch: FloatArray
 ) -> float:
-    """Largest difference of heading between two fields, degrees."""
+    """Largest difference of heading between two fields, degrees.
+
+    Examples
+    --------
+    >>> north, askew = np.array([[200.0, 0.0, 400.0]]), np.array([[200.0, 200.0, 400.0]])
+    >>> largest_shift(askew, north, np.zeros(1), np.zeros(1))
+    45.0
+    """
     return float(np.degrees(np.abs(shifts(found, true, roll, pitch)).max()))
 
 

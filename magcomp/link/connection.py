@@ -17,14 +17,14 @@ from magcomp.link.address import (
     parse_address,
 )
 from magcomp.link.clock import Clock, SystemClock
-from magcomp.link.diagnosis import why_no_vehicle
+from magcomp.link.diagnosis import why_ambiguous, why_no_vehicle
 from magcomp.link.events import LinkEvent
 from magcomp.link.framing import GROUND_STATION_SYSTEM, Message
 from magcomp.link.opening import open_transport
 from magcomp.link.quality import LinkStatistics
 from magcomp.link.sinks import FrameSink, Sinks
 from magcomp.link.state import LinkState
-from magcomp.link.streams import DEFAULT_RATES, StreamReport, affordable
+from magcomp.link.streams import DEFAULT_RATES, StreamReport, affordable, as_sent_by
 from magcomp.link.transport import ReplayEndedError, Transport, TransportClosedError
 from magcomp.model import Vehicle
 
@@ -140,19 +140,11 @@ class Connection:
         with self._changed:
             self._changed.wait_for(self._vehicle_clear, timeout)
             self._raise_failure()
-            if self._state.has_twin and self._state.ambiguous():
-                raise LinkError(
-                    f"One vehicle of a number must be on {self.address}; instead two at different "
-                    f"addresses say that they are system {self._state.heartbeats[0].system}. "
-                    "Give one of them another number, or switch it off."
-                )
             if self._state.ambiguous():
-                systems = " and ".join(
-                    f"{h.system} ({h.autopilot} {h.kind})" for h in self._state.heartbeats
-                )
                 raise LinkError(
-                    f"Several vehicles are on {self.address}, systems {systems}; "
-                    "choose one with --system."
+                    why_ambiguous(
+                        str(self.address), self._state.heartbeats, twins=self._state.has_twin
+                    )
                 )
             vehicle = self._state.vehicle
             if vehicle is None:
@@ -229,6 +221,8 @@ class Connection:
         if isinstance(address, SerialLine) and address.baud < _SLOW_BAUD:
             rates = affordable(rates, address.baud / 10)
         with self._changed:
+            if (vehicle := self._state.vehicle) is not None:
+                rates = as_sent_by(vehicle, rates)
             self._state.request_streams(rates, self._now())
             report = self._state.stream_report
             if report is None:

@@ -20,6 +20,7 @@ from types import MappingProxyType
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from magcomp import autopilots
 from magcomp.errors import UsageError
 from magcomp.link.framing import (
     GROUND_STATION_COMPONENT,
@@ -27,6 +28,7 @@ from magcomp.link.framing import (
     Message,
 )
 from magcomp.link.identity import command
+from magcomp.model import Vehicle
 
 DEFAULT_RATES: Mapping[str, float] = MappingProxyType(
     {
@@ -45,6 +47,7 @@ DEFAULT_RATES: Mapping[str, float] = MappingProxyType(
 
 _GROUPS = {
     "RAW_IMU": mavlink.MAV_DATA_STREAM_RAW_SENSORS,
+    "SCALED_IMU": mavlink.MAV_DATA_STREAM_RAW_SENSORS,
     "SCALED_IMU2": mavlink.MAV_DATA_STREAM_RAW_SENSORS,
     "SCALED_IMU3": mavlink.MAV_DATA_STREAM_RAW_SENSORS,
     "SYS_STATUS": mavlink.MAV_DATA_STREAM_EXTENDED_STATUS,
@@ -63,6 +66,7 @@ _IDS = {
     for number, message in mavlink.mavlink_map.items()
     if message.msgname in _GROUPS
 }
+_FIRST_COMPASS = "RAW_IMU"
 _FRAME_OVERHEAD = 12
 _USABLE_SHARE = 0.7
 _LEAST_HZ = 1.0
@@ -99,6 +103,12 @@ class StreamReport:
     how: Mapping[str, How]
     previous_us: Mapping[str, int]
     complete: bool
+
+
+def as_sent_by(vehicle: Vehicle, rates: Mapping[str, float]) -> Mapping[str, float]:
+    """The same rates, for the message in which this vehicle sends its first compass."""
+    first = autopilots.of(vehicle).first_compass_message
+    return {first if name == _FIRST_COMPASS else name: rate for name, rate in rates.items()}
 
 
 def affordable(rates: Mapping[str, float], bytes_per_s: float) -> Mapping[str, float]:

@@ -36,6 +36,7 @@ _THROTTLE_SHARE_S = 2.0
 _HELD_LEVELS = (0, 2, 4, 3, 1, 5)
 _LOW_M = 8.0
 _STABLE_REFITS = 2
+STEADY = "a steady answer"
 FINE_DEG = 0.5
 LONG_S = 240.0
 """A bound that is worth waiting for, and how long."""
@@ -61,6 +62,14 @@ class Guidance:
     share_done: float
     enough: bool = False
     missing: tuple[str, ...] = ()
+
+    @property
+    def early(self) -> bool:
+        """Too little is recorded for a verdict against a compass.
+
+        Where only the answer is wanting, everything was flown: then a rejection is one.
+        """
+        return not self.enough and self.missing != (STEADY,)
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,7 +197,7 @@ def _guide_unsure(view: View) -> Guidance:
     shares = {
         "headings": min(len(_sectors(view)) / SECTORS_ENOUGH, 1.0),
         "time": min(view.seconds / FLIGHT_S, 1.0),
-        "a steady answer": _steadiness(view) if view.grade is Grade.GOOD else 0.0,
+        STEADY: _steadiness(view) if view.grade is Grade.GOOD else 0.0,
     }
     missing = _missing(shares)
     if not missing and is_settled(view):
@@ -207,7 +216,7 @@ def _guide_flight(view: View) -> Guidance:
         "headings": min(len(sectors) / SECTORS_ENOUGH, 1.0),
         "climbs and descents": min(throttles / THROTTLES_ENOUGH, 1.0),
         "time": min(view.seconds / FLIGHT_S, 1.0),
-        "a steady answer": _steadiness(view) if view.grade is Grade.GOOD else 0.0,
+        STEADY: _steadiness(view) if view.grade is Grade.GOOD else 0.0,
     }
     turns, climbs, *_ = shares.values()
     share = float(np.mean(list(shares.values())))
@@ -253,7 +262,7 @@ def _guide_held(view: View) -> Guidance:
     best = np.sort(np.minimum(fraction / LEVEL_ENOUGH, 1.0))[::-1][:LEVELS_ENOUGH]
     shares = {
         "turns at three throttles": float(best.sum()) / LEVELS_ENOUGH,
-        "a steady answer": _steadiness(view) if len(done) >= LEVELS_ENOUGH else 0.0,
+        STEADY: _steadiness(view) if len(done) >= LEVELS_ENOUGH else 0.0,
     }
     turns, steadiness = shares.values()
     share, missing = 0.9 * turns + 0.1 * steadiness, _missing(shares)
@@ -295,7 +304,7 @@ def _guide_still(view: View) -> Guidance:
     done = [level for level, time in enumerate(seconds) if time >= STEP_S]
     shares = {
         f"{STEPS_ENOUGH} steps of the throttle": min(len(done) / STEPS_ENOUGH, 1.0),
-        "a steady answer": _steadiness(view) if len(done) >= STEPS_ENOUGH else 0.0,
+        STEADY: _steadiness(view) if len(done) >= STEPS_ENOUGH else 0.0,
     }
     steps, steadiness = shares.values()
     share, missing = 0.9 * steps + 0.1 * steadiness, _missing(shares)

@@ -56,8 +56,9 @@ class Sensors:
 
     Notes
     -----
-    A frame repeats the field until the compass is read again (AUTOPILOTS.md, Timing): only a
-    change is a reading. Its age is the lag a fit expects before it has estimated one.
+    A frame repeats the field until the compass is read again: only a change is a reading
+    (docs/autopilots.md, ArduPilot: timing). Its age is the lag a fit expects before it has
+    estimated one.
     """
 
     def __init__(self, compass: int) -> None:

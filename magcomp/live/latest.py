@@ -15,7 +15,8 @@ from magcomp.mavlink.parameters import decode_param_value, encoding, name_and_fi
 from magcomp.model import Vehicle
 
 _SENSOR_COMPASS = 0x04  # MAV_SYS_STATUS_SENSOR_3D_MAG
-_FIELD_MESSAGES = {1: Message.RAW_IMU, 2: Message.SCALED_IMU2, 3: Message.SCALED_IMU3}
+_FIRST_COMPASS = (Message.RAW_IMU, Message.SCALED_IMU)  # which of them depends on the firmware
+_OTHER_COMPASSES = {2: Message.SCALED_IMU2, 3: Message.SCALED_IMU3}
 _STALE_US = 2_000_000
 _MOST_SENDERS = 64
 _MILLI_G = 9.80665e-3
@@ -34,7 +35,8 @@ class Now:
     armed
         None before the first heartbeat.
     fields
-        Compass number to the corrected field in mGauss, where it came within two seconds.
+        What the first, second and third compass message hold, mGauss, where they came within two
+        seconds: what that means, the autopilot knows (``Autopilot.from_telemetry``).
     silent
         Compass numbers whose field came before, but no more.
     attitude
@@ -130,9 +132,11 @@ class Latest:
         heartbeat = rows.get(Message.HEARTBEAT)
         attitude = rows.get(Message.ATTITUDE)
         hud = rows.get(Message.VFR_HUD)
+        first = next((message for message in _FIRST_COMPASS if message in kept), Message.RAW_IMU)
+        messages = {1: first, **_OTHER_COMPASSES}
         fields = {
             number: _vector(rows[message], ("xmag", "ymag", "zmag"))
-            for number, message in _FIELD_MESSAGES.items()
+            for number, message in messages.items()
             if message in rows
         }
         return Now(
@@ -142,7 +146,7 @@ class Latest:
             fields={number: field for number, field in fields.items() if any(field)},
             silent=tuple(
                 number
-                for number, message in _FIELD_MESSAGES.items()
+                for number, message in messages.items()
                 if message in kept and message not in rows
             ),
             attitude=None if attitude is None else _vector(attitude, ("roll", "pitch", "yaw")),

@@ -160,7 +160,8 @@ def change_deg(before: Analysis, after: Analysis) -> float:
 
     Notes
     -----
-    A change of the field across the horizontal field is a change of heading (PAPER.md 9).
+    A change of the field across the horizontal field is a change of heading (docs/method.md,
+    Equation 9).
     """
     old = {result.fit.compass: result for result in before.compasses}
     new = {result.fit.compass: result for result in after.compasses}

@@ -19,13 +19,14 @@ from magcomp.live.latest import Now, Vector
 from magcomp.live.progress import Bound
 from magcomp.live.refit import Refit
 from magcomp.live.situation import Situation
-from magcomp.model import THROTTLE, Analysis, Grade, InForce, MotorFit, Vehicle
+from magcomp.model import THROTTLE, Analysis, Grade, InForce, MotorFit, Series, Vehicle
 
 _PLAUSIBLE = (150.0, 900.0)
+"""mGauss: the earth's field is 220 … 670; motors and a bad calibration add to it."""
+
 _RATES_SETTLED_S = 8.0
 _FAST_HZ = 5.0
 _SLOW_SHARE = 0.6
-"""mGauss: the earth's field is 220 … 670; motors and a bad calibration add to it."""
 
 
 @dataclass(frozen=True)
@@ -170,13 +171,30 @@ def compasses_now(
     results = refit.analysis.compasses if refit.analysis else ()
     grades = {result.fit.compass: result.verdict.grade for result in results}
     autopilot = None if vehicle is None else autopilots.of(vehicle)
+    if autopilot is None:
+        return ()
+    told = {number: Series(np.zeros(1), np.array([field])) for number, field in now.fields.items()}
+    fields, uncorrected = autopilot.from_telemetry(told, parameters)
     found = []
-    for number, field in sorted(now.fields.items()):
+    for number, series in sorted(fields.items()):
         fit, present = refit.fresh.get(number), None
-        if fit is not None and autopilot is not None:
+        x, y, z = series.value[0].tolist()
+        field = (x, y, z)
+        if fit is not None or number in uncorrected:
             present = autopilot.in_force(parameters, number)
+        if present is not None and number in uncorrected:
+            field = _applied(field, now, present) or field
         found.append(_compass_now(number, field, now, present, fit, grades.get(number)))
     return tuple(found)
+
+
+def _applied(raw: Vector, now: Now, present: InForce) -> Vector | None:
+    """What the vehicle makes of a sensor's own field."""
+    u = now.throttle if present.regressor == THROTTLE else now.current
+    if u is None and present.correction.motor.any():
+        return None
+    x, y, z = present.correction.apply(np.array([raw]), np.array([u or 0.0]))[0].tolist()
+    return x, y, z
 
 
 def _compass_now(

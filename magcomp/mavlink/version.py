@@ -40,6 +40,28 @@ def is_numbered_board(name: str) -> bool:
     return name.startswith(_BOARD)
 
 
+def number_in_words(words: str) -> str:
+    """The flight controller's own number from what it says of itself at start.
+
+    Parameters
+    ----------
+    words
+        Three groups of eight hexadecimal digits, each with its bytes reversed.
+
+    Returns
+    -------
+    str
+        As :func:`unique_id`; empty where nothing but zeros was left of it.
+
+    Examples
+    --------
+    >>> number_in_words("00510027 33355115 31373937")
+    '270051001551353337393731'
+    """
+    number = b"".join(bytes.fromhex(word)[::-1] for word in words.split())
+    return unique_id(number, 0)
+
+
 def unique_id(uid2: bytes, uid: int) -> str:
     """The flight controller's own number, which tells it from its twins.
 

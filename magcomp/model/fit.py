@@ -35,7 +35,13 @@ def unpack(parameters: FloatArray) -> Correction:
 
 
 def symmetric(six: FloatArray) -> FloatArray:
-    """Symmetric 3×3 matrix from xx, yy, zz, xy, xz, yz."""
+    """Symmetric 3×3 matrix from xx, yy, zz, xy, xz, yz.
+
+    Examples
+    --------
+    >>> symmetric(np.array([1.0, 2.0, 3.0, 0.1, 0.2, 0.3])).tolist()
+    [[1.0, 0.1, 0.2], [0.1, 2.0, 0.3], [0.2, 0.3, 3.0]]
+    """
     matrix = np.empty((3, 3))
     matrix[_ROWS, _COLUMNS] = six
     matrix[_COLUMNS, _ROWS] = six
@@ -44,7 +50,7 @@ def symmetric(six: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """The centre of the raw ellipsoid at one control quantity: a point of the paper's Fig. 4.
+    """The centre of the raw ellipsoid at one control quantity: docs/method.md, Fig. 4.
 
     Attributes
     ----------
@@ -220,6 +226,9 @@ class Coverage:
         Range of the control quantity.
     seconds
         Time with readings in use.
+    u_median
+        Control quantity in use half of the time the motors worked: the hover of a flight. NaN
+        where unknown.
     """
 
     sphere: float
@@ -228,6 +237,7 @@ class Coverage:
     u_low: float
     u_high: float
     seconds: float
+    u_median: float = np.nan
 
 
 @dataclass(frozen=True)

@@ -34,7 +34,7 @@ class Correction:
     motor: FloatArray
 
     def apply(self, raw: FloatArray, u: FloatArray) -> FloatArray:
-        """Corrected field, mGauss, shape (n, 3); PAPER.md equation 6 with a moving centre."""
+        """Corrected field, mGauss, shape (n, 3): docs/method.md, Equation 6."""
         return (raw + self.offset) @ self.soft_iron.T + np.multiply.outer(u, self.motor)
 
     def undo(self, corrected: FloatArray, u: FloatArray) -> FloatArray:

@@ -1,4 +1,4 @@
-"""The paper's Figs 3 and 4 in space: the field's cloud, its ellipsoids, the line of centres."""
+"""The field's cloud, its ellipsoids and centres: docs/method.md, Fig. 3, and Fig. 4."""
 
 from __future__ import annotations
 
@@ -126,7 +126,7 @@ def _points(raw: FloatArray, u: list[float], quantity: Quantity, shades: dict[st
 
 
 def _ellipsoid(fit: MotorFit, level: Level, quantity: Quantity, top: float) -> Trace:
-    """Wires of |D · (raw − centre)| = F, PAPER.md 5 and 6."""
+    """Wires of |D · (raw − centre)| = F, docs/method.md, Equations 5 and 6."""
     surface = np.linalg.solve(fit.correction.soft_iron, fit.strength * wires().T).T
     return _wired(level.centre + surface, level, quantity, top)
 
@@ -246,11 +246,11 @@ def space(corners: FloatArray | None = None) -> dict[str, Any]:
 
     return {
         "scene": {
-            "xaxis": side("x forward (mGauss)", 0),
+            "xaxis": side("forward (mGauss)", 0),
             # Down is drawn downwards, as the vehicle stands; reversing y too keeps the picture from
             # being a mirror image.
-            "yaxis": side("y right (mGauss)", 1),
-            "zaxis": side("z down (mGauss)", 2),
+            "yaxis": side("right (mGauss)", 1),
+            "zaxis": side("down (mGauss)", 2),
             "aspectmode": "data" if corners is None else "cube",
             "camera": {
                 "eye": {"x": 1.55, "y": -1.55, "z": 0.7},

@@ -1,6 +1,6 @@
 """How the autopilot answers: parameters, commands, arming. Messages in, messages out, no I/O.
 
-The rules, as in ArduCopter 4.6 (AUTOPILOTS.md, "Parameters" and "Rates"):
+The rules, as in ArduCopter 4.6 (docs/autopilots.md, ArduPilot: parameters):
 
 - An unknown parameter, a NaN or an infinity gets no reply.
 - A set is answered with index 65535; setting _X answers for Y and Z too.

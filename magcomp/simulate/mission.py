@@ -1,6 +1,6 @@
 """An autonomous square, flown with the heading that the autopilot believes in.
 
-The paper's Figs 8 and 9: a heading that is off by e turns every acceleration
+docs/method.md, Figs 8 and 9: a heading that is off by e turns every acceleration
 the autopilot commands by −e, so that an uncompensated compass bends the true path.
 """
 

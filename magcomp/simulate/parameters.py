@@ -1,6 +1,6 @@
 """The autopilot's parameter store: names, types, values and who may see or write them.
 
-It keeps ArduPilot 4.6's habits (AUTOPILOTS.md, "Parameters"): values are
+It keeps ArduPilot 4.6's habits (docs/autopilots.md, ArduPilot: parameters): values are
 float32 or whole numbers of 8, 16 or 32 bits, names that belong to a switched-off
 feature are hidden from the list, and the first name of a vector answers for
 all three.

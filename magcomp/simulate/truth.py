@@ -72,7 +72,7 @@ BATTERY = Power()
 """What an ordinary quadrotor flies on."""
 
 PAPER_BENCH = Power(
-    # 32 A at 200 per mille and 53 A at 300, nothing at 0: PAPER.md, Table 1.
+    # 32 A at 200 per mille and 53 A at 300, nothing at 0: docs/method.md, Table 1.
     full_a=32.0 * 5.0 ** (np.log(53.0 / 32.0) / np.log(1.5)),
     exponent=float(np.log(53.0 / 32.0) / np.log(1.5)),
     idle_a=0.0,
@@ -111,7 +111,7 @@ class CompassTruth:
 
         Notes
         -----
-        PAPER.md equation 3: D⁻¹·field − OFS.
+        docs/method.md, Equation 3: D⁻¹·field − OFS.
         """
         return np.asarray(field @ self._distortion.T - self.offset)
 

@@ -6,7 +6,8 @@ recorder's is in every record, but radios deliver late and in bursts, a recorder
 records, and a simulation may run faster than it. The order of the records is always there. So:
 
 - A message with the vehicle's time is put there; a reboot begins a new stretch, which is placed
-  after the one before it by the recorder's clock; a wrap is undone.
+  after the one before it by the recorder's clock, as does a leap of the vehicle's clock during
+  which next to no time was recorded; a wrap is undone.
 - Any other message is put between the stamped ones around it by its place in the stream.
 - Where the vehicle's clock is missing or stands still, the recorder's is all there is.
 """
@@ -34,6 +35,7 @@ _DISORDER = SECOND
 _NEAR = 60 * SECOND
 _LATE_FRAMES = 10
 _USABLE_SHARE = 0.9
+_PACE = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +157,21 @@ def _unroll(stamps: Stamps, arrival: OffsetArray) -> OffsetArray:
     older[drops] |= stamps.time[soon].max(axis=1) >= stamps.time[drops] - _DISORDER
     reboot = back & ~older
     step = np.where(reboot, np.where(waited > 0, waited, SECOND), step)
+    step = np.where(_leapt(step, waited), waited, step)
     return np.concatenate([np.zeros(1, dtype=np.int64), np.cumsum(step)])
+
+
+def _leapt(step: OffsetArray, waited: OffsetArray) -> MaskArray:
+    """Which steps of the vehicle's clock are a leap: no such time passed where it was recorded.
+
+    Told only where the recorder keeps pace; a simulation may run faster than it.
+    """
+    usual = (np.abs(step) < _NEAR) & (waited >= 0) & (waited < _NEAR)
+    passed = int(waited[usual].sum())
+    pace = int(step[usual].sum()) / passed if passed > 0 else 0.0
+    if not 1.0 / _PACE < pace < _PACE:
+        return np.zeros(len(step), dtype=bool)
+    return np.asarray((waited >= 0) & (step > _PACE * waited + _NEAR))
 
 
 def _settle(stamps: Stamps, leader: Stamps, elapsed: OffsetArray, stream: _Stream) -> _Settled:

@@ -25,7 +25,7 @@ _SYSTEM_NAMES = ("MAV_SYS_ID", "MAV_COMP_ID", "MAV_TYPE")
 _ROTARY = 1
 _ATTITUDE = "vehicle_attitude"
 
-_TOPICS = (
+TOPICS = (
     "actuator_armed",
     "actuator_controls_0",
     "actuator_motors",
@@ -77,7 +77,7 @@ def read_ulog(path: str | Path) -> Recording:
     """
     with mapped(path) as data:
         octets = data.tobytes()
-    log = read_ulog_file(octets, str(path), _TOPICS)
+    log = read_ulog_file(octets, str(path), TOPICS)
     if not log.topics:
         raise LogError(
             f"Log {path} must hold messages of a vehicle; instead received a PX4 log without one "

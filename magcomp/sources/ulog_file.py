@@ -1,23 +1,17 @@
-"""The topics, parameters and facts of a PX4 log (.ulg), whatever is wrong with the file.
-
-pyulog takes the file apart. It prints what it finds wrong, raises whatever happens to it, believes
-any length that a format claims, and looks at damaged bytes one by one; all of that ends here.
-"""
+"""The topics, parameters and facts of a PX4 log (.ulg), whatever is wrong with the file."""
 
 from __future__ import annotations
 
-import io
 import re
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pyulog import ULog, core
 
-from magcomp.errors import LogError
 from magcomp.model import FloatArray
+from magcomp.sources.ulog_walk import Subscription, Walked, walk
 
 Columns = Mapping[str, NDArray[Any]]
 
@@ -26,20 +20,28 @@ MICROSECOND = 1e-6
 _LONGEST_MESSAGE = 1 << 16
 """A message's length is told in 16 bits, so no topic is longer."""
 
-_READS_PER_BYTE = 0.5
-_READS_ALWAYS = 10_000
-"""A sound file takes two reads for each message of at least 10 bytes."""
+_FIELD = re.compile(r"([\w/-]+?)(?:\[(\d{1,5})\])? (\w+)")
+_TYPES = {
+    "int8_t": "i1",
+    "uint8_t": "u1",
+    "bool": "i1",
+    "char": "i1",
+    "int16_t": "<i2",
+    "uint16_t": "<u2",
+    "int32_t": "<i4",
+    "uint32_t": "<u4",
+    "int64_t": "<i8",
+    "uint64_t": "<u8",
+    "float": "<f4",
+    "double": "<f8",
+}
+_STAMP_BYTES = 8
+_DEEPEST = 8
+"""Formats inside one another."""
 
 _DAY_US = 86_400_000_000
 _BEFORE_US = 1_000_000
 """Rows from further before the log say how it was, not when."""
-
-
-def _say_nothing(*_: object, **__: object) -> None:
-    """Stand for print inside pyulog: a log's damage is told by what is read of it."""
-
-
-core.print = _say_nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,35 +135,6 @@ class UlogFile:
         }
 
 
-@dataclass
-class _Bounded(io.RawIOBase):
-    """A file in memory that ends a search that goes over its bytes one by one."""
-
-    data: bytes
-    source: str
-    _file: io.BytesIO = field(init=False)
-    _reads: float = field(init=False)
-
-    def __post_init__(self) -> None:
-        self._file = io.BytesIO(self.data)
-        self._reads = _READS_ALWAYS + _READS_PER_BYTE * len(self.data)
-
-    def read(self, size: int = -1) -> bytes:
-        self._reads -= 1
-        if self._reads < 0:
-            raise LogError(
-                f"Log {self.source} must be a whole PX4 log (.ulg); instead received one that is "
-                f"damaged from byte {self._file.tell()} on: copy it again from the vehicle."
-            )
-        return self._file.read(size)
-
-    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
-        return self._file.seek(offset, whence)
-
-    def tell(self) -> int:
-        return self._file.tell()
-
-
 def read_ulog_file(data: bytes, source: str, wanted: Collection[str]) -> UlogFile:
     """Take apart a log.
 
@@ -177,109 +150,134 @@ def read_ulog_file(data: bytes, source: str, wanted: Collection[str]) -> UlogFil
     Raises
     ------
     LogError
-        It cannot be taken apart.
+        It is of a form that this cannot know.
     """
-    log = _parse(data, source, list(wanted))
+    log = walk(data, source, wanted)
     parts = _parts(log)
     start = _start(log, parts)
     return UlogFile(
         topics=_topics(parts, start),
-        info=dict(log.msg_info_dict),
-        initial={name: float(v) for name, v in log.initial_parameters.items() if _is_number(v)},
-        changed=tuple(
-            (int(time), name, float(v)) for time, name, v in log.changed_parameters if _is_number(v)
-        ),
-        messages=tuple(message.message for message in log.logged_messages),
+        info=log.info,
+        initial=log.initial,
+        changed=tuple((_stamp(row, start), name, value) for row, name, value in log.changed),
+        messages=tuple(log.messages),
         start=start,
     )
 
 
-class _Wary(ULog):  # type: ignore[misc]
-    """pyulog that does not take a topic for longer than a message can be."""
-
-    class _MessageAddLogged(ULog._MessageAddLogged):  # type: ignore[misc]
-        def __init__(self, data: bytes, header: Any, message_formats: Mapping[str, Any]) -> None:
-            name = ULog.parse_string(data[3:])
-            if _fields(name, message_formats, {}, ()) > _LONGEST_MESSAGE:
-                # pyulog goes on with the other topics.
-                raise ValueError
-            super().__init__(data, header, message_formats)
+def _stamp(row: bytes, start: int) -> int:
+    """Microseconds at which a message was said: its first field, in every topic."""
+    said = int.from_bytes(row[:_STAMP_BYTES], "little")
+    return said if len(row) >= _STAMP_BYTES and abs(said - start) < _DAY_US else start
 
 
-def _fields(
-    name: str, forms: Mapping[str, Any], known: dict[str, int], above: tuple[str, ...]
-) -> int:
-    """How many fields a format has, those of the formats inside it too."""
-    if name in above:
-        return _LONGEST_MESSAGE + 1
-    if name not in known:
-        total = 0
-        for kind, count, _ in forms[name].fields:
-            each = 1 if kind not in forms else _fields(kind, forms, known, (*above, name))
-            total += max(int(count), 1) * each
-        known[name] = total
-    return known[name]
+class _Layout(NamedTuple):
+    """How a topic's rows are laid out, and their length with the padding at their end, bytes."""
+
+    kind: np.dtype[Any]
+    padded: int
 
 
-def _parse(data: bytes, source: str, wanted: list[str]) -> Any:
-    try:
-        return _Wary(_Bounded(data, source), wanted)
-    except (LogError, MemoryError):
-        raise
-    except Exception as error:
-        raise LogError(
-            f"Log {source} must be a PX4 log (.ulg) that can be taken apart; instead received "
-            f"{type(error).__name__} ({_one_line(error)}): copy it again from the vehicle."
-        ) from error
+def _layout(name: str, forms: Mapping[str, str]) -> _Layout | None:
+    """None where the format is none, too long for a message, or says nothing of the time."""
+    fields = _flat(name, "", forms, ())
+    padded = sum(np.dtype(kind).itemsize for _, kind in fields)
+    if padded > _LONGEST_MESSAGE:
+        return None
+    # The firmware leaves out padding at the end of a format.
+    while fields and fields[-1][0].startswith("_padding"):
+        fields.pop()
+    names = [called for called, _ in fields]
+    if "timestamp" not in names or len(set(names)) < len(names):
+        return None
+    return _Layout(np.dtype(fields), padded)
 
 
-def _one_line(error: Exception) -> str:
-    return re.sub(r"\s+", " ", str(error))[:80] or "no reason given"
+def _table(subscription: Subscription, layout: _Layout) -> NDArray[Any] | None:
+    """The rows of a subscription; None where none is whole."""
+    size = layout.kind.itemsize
+    rows = [row[:size] for row in subscription.rows if size <= len(row) <= layout.padded]
+    return np.frombuffer(b"".join(rows), dtype=layout.kind) if rows else None
 
 
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float)
+def _flat(
+    name: str, before: str, forms: Mapping[str, str], above: tuple[str, ...]
+) -> list[tuple[str, str]]:
+    """Names and numpy types of a format's fields, those of the formats inside it in their places.
+
+    Empty where the format is not known, or longer than a message can be.
+    """
+    found: list[tuple[str, str]] = []
+    if name in above or len(above) > _DEEPEST:
+        return []
+    for text in filter(None, forms.get(name, "").split(";")):
+        parts = _FIELD.fullmatch(text)
+        if parts is None:
+            return []
+        kind, count, called = parts.groups()
+        for index in range(1 if count is None else int(count)):
+            whole = before + (called if count is None else f"{called}[{index}]")
+            if kind in _TYPES:
+                found.append((whole, _TYPES[kind]))
+            else:
+                inner = _flat(kind, f"{whole}.", forms, (*above, name))
+                if not inner:
+                    return []
+                found.extend(inner)
+            if len(found) > _LONGEST_MESSAGE:
+                return []
+    return found
 
 
-def _parts(log: Any) -> dict[tuple[str, int], list[Columns]]:
+def _parts(log: Walked) -> dict[tuple[str, int], list[NDArray[Any]]]:
     """What came of each topic; what was appended after a crash comes apart from the rest."""
-    parts: dict[tuple[str, int], list[Columns]] = {}
-    for data in log.data_list:
-        if "timestamp" in data.data:
-            parts.setdefault((data.name, int(data.multi_id)), []).append(data.data)
+    parts: dict[tuple[str, int], list[NDArray[Any]]] = {}
+    names = {subscription.name for subscription in log.subscriptions}
+    layouts = {name: _layout(name, log.forms) for name in names}
+    for subscription in log.subscriptions:
+        layout = layouts[subscription.name]
+        table = None if layout is None else _table(subscription, layout)
+        if table is not None:
+            parts.setdefault((subscription.name, subscription.instance), []).append(table)
     return parts
 
 
-def _start(log: Any, parts: Mapping[tuple[str, int], list[Columns]]) -> int:
+def _start(log: Walked, parts: Mapping[tuple[str, int], list[NDArray[Any]]]) -> int:
     """When the log began, as it says; the earliest row where that cannot be.
 
     A topic that seldom changes comes first with the last message from before the log.
     """
     stamps = [each["timestamp"] for tables in parts.values() for each in tables]
     if not stamps:
-        return int(log.start_timestamp)
+        return log.start
     every = np.concatenate([stamp.astype(np.float64) for stamp in stamps])
     every = every[np.isfinite(every)]
     if not len(every):
         return 0
     middle = float(np.median(every))
-    said = float(log.start_timestamp)
+    said = float(log.start)
     if middle - _DAY_US < said <= middle:
         return int(said)
     return int(every[np.abs(every - middle) < _DAY_US].min())
 
 
 def _topics(
-    parts: Mapping[tuple[str, int], list[Columns]], start: int
+    parts: Mapping[tuple[str, int], list[NDArray[Any]]], start: int
 ) -> dict[tuple[str, int], Topic]:
     """Rows in order of time, without those before the log and of another day."""
     found = {}
     for key, tables in parts.items():
-        alike = [each for each in tables if each.keys() == tables[0].keys()]
-        columns = {name: np.concatenate([each[name] for each in alike]) for name in tables[0]}
-        since = columns["timestamp"].astype(np.float64) - start
+        alike = [each for each in tables if each.dtype == tables[0].dtype]
+        table = alike[0] if len(alike) == 1 else np.concatenate(alike)
+        with np.errstate(invalid="ignore"):
+            since = table["timestamp"].astype(np.float64) - start
         rows = np.flatnonzero((since > -_BEFORE_US) & (since < _DAY_US))
         rows = rows[np.argsort(since[rows], kind="stable")]
         if len(rows):
-            found[key] = Topic({name: values[rows] for name, values in columns.items()})
+            chosen = table if len(rows) == len(table) and _in_order(since) else table[rows]
+            found[key] = Topic({name: chosen[name] for name in chosen.dtype.names or ()})
     return found
+
+
+def _in_order(time: FloatArray) -> bool:
+    return bool((np.diff(time) >= 0.0).all())

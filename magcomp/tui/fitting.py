@@ -14,8 +14,10 @@ from magcomp.model import Analysis, Recording
 from magcomp.tui import writing
 from magcomp.tui.base import BaseApp
 from magcomp.tui.pictures import CompassPicture
-from magcomp.tui.screens.dialogs import AskText, Fault
+from magcomp.tui.screens.dialogs import Fault
+from magcomp.tui.screens.time_range import TimeRange
 from magcomp.tui.services import Progress, fit
+from magcomp.tui.widgets.flight_strip import Strip, loads
 
 _Answer = tuple[Recording, Analysis, Mapping[int, CompassPicture]]
 
@@ -68,12 +70,8 @@ def ask_time_range(app: BaseApp) -> None:
     options, recording = app.work.options, app.work.recording
     whole = 0.0 if recording is None else recording.duration_s
     start_s, end_s = max(options.start, 0.0), min(options.end, whole)
-    dialog = AskText(
-        "Time range",
-        f"Which part to fit, in seconds; the recording is {whole:.0f} s long.",
-        (("From", f"{start_s:g}"), ("To", f"{end_s:.0f}")),
-        check=partial(_range_fault, whole),
-    )
+    strip = Strip(() if recording is None else loads(recording), whole, start_s, end_s)
+    dialog = TimeRange(strip, check=partial(_range_fault, whole))
 
     def take(answer: tuple[str, ...] | None) -> None:
         if answer is None:

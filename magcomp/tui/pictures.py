@@ -11,8 +11,9 @@ from magcomp.model import CURRENT, CompassResult, FloatArray
 from magcomp.report import words
 from magcomp.report.evidence import CompassPlots
 
-AXES = ("x", "y", "z")
 AXIS_WORDS = ("forward", "right", "down")
+AXES = tuple(word[0] for word in AXIS_WORDS)
+"""How a picture marks them."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +78,7 @@ class Shift:
 
 
 def shift(result: CompassResult) -> Shift:
-    """Centres and line of one compass; PAPER.md Fig. 4, seen along each axis."""
+    """Centres and line of one compass; docs/method.md, Fig. 4, seen along each axis."""
     fit = result.fit
     scale = 1.0 if fit.regressor == CURRENT else 100.0
     rest = fit.correction.centre(0.0)

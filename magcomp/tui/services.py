@@ -13,14 +13,11 @@ from typing import Protocol
 from magcomp.analysis import Options, analyse, check
 from magcomp.errors import LinkError, MagcompError, UsageError
 from magcomp.link import SerialPort, serial_ports
-from magcomp.live.session import LiveSession
 from magcomp.live.snapshot import LiveSnapshot
 from magcomp.live.upload import new_file
 from magcomp.model import Analysis, ParameterSet, Recording, Vehicle, Verdict
 from magcomp.report.evidence import compass_plots
 from magcomp.report.files import report_text, write_text
-from magcomp.simulate import Vehicle as SimulatedVehicle
-from magcomp.simulate import scenario, serve
 from magcomp.sources import read
 from magcomp.tui.pictures import CompassPicture, picture
 from magcomp.writing.events import Event, Outcome
@@ -101,6 +98,9 @@ def open_live(
     address: str, record: Path, system: int | None, component: int | None = None
 ) -> Session:
     """Open a vehicle's address and record what comes; see `LiveSession.open`."""
+    # The first screen must not wait for what only a vehicle needs.
+    from magcomp.live.session import LiveSession  # noqa: PLC0415
+
     return LiveSession.open(address, record=record, system=system, component=component)
 
 
@@ -112,10 +112,13 @@ def simulate() -> Simulation:
     LinkError
         It could not be started.
     """
+    # The first screen must not wait for a simulation that few ask for.
+    from magcomp.simulate import Vehicle, scenario, serve  # noqa: PLC0415
+
     stop = threading.Event()
     ready: queue.Queue[str | Exception] = queue.Queue()
 
-    vehicle = SimulatedVehicle(scenario("flight", seed=7), wait_for_ground=True)
+    vehicle = Vehicle(scenario("flight", seed=7), wait_for_ground=True)
 
     def live() -> None:
         try:

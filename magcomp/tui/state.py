@@ -55,3 +55,8 @@ class State:
     busy: Busy | None = None
     choices: tuple[Choice, ...] = ()
     asked: Options = field(default_factory=Options)
+
+    @property
+    def early(self) -> bool:
+        """Too little is recorded yet for a verdict against a compass."""
+        return self.live is not None and self.live.guidance.early

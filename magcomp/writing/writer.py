@@ -281,7 +281,10 @@ class _Drive:
         with contextlib.suppress(OutputError):
             self._tell(sequence.poll(self._clock())[0])
         if self._failure is not None:
-            self._failure.add_note(f"While a vehicle was written; {stands(sequence.outcome)}.")
+            # The user sees it below the error, whatever that was.
+            self._failure.add_note(
+                f"It came while the vehicle was written: {stands(sequence.outcome)}"
+            )
             raise self._failure
         return sequence.outcome
 

@@ -10,7 +10,7 @@ from synthetic import EXACT, Flown, problem_of
 
 from magcomp.align import controls, readings, reported, sample
 from magcomp.autopilots import ardupilot
-from magcomp.errors import MissingDataError
+from magcomp.errors import MissingDataError, UsageError
 from magcomp.model import Lags, ParameterChange, ParameterHistory, Recording, Series
 
 
@@ -118,6 +118,26 @@ def test_disarmed_time_is_used_where_there_is_nothing_better(recording, armed_s)
     assert len(kept) == len(readings(recording, 1))
 
 
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ({"start": 500.0}, "before the log ends at 60 s; instead received 500 s"),
+        ({"end": -1.0}, "after the log begins at 0 s; instead received -1 s"),
+    ],
+)
+def test_a_time_the_log_does_not_reach_is_told_where_it_ends(recording, asked, said):
+    with pytest.raises(UsageError, match=said):
+        readings(recording, 1, **asked)
+
+
+def test_a_time_without_readings_says_so(recording):
+    field = recording.field[1]
+    late = field.time > 30.0
+    silent = with_field(recording, field.time[late], field.value[late])
+    with pytest.raises(MissingDataError, match=f"none of its {late.sum()} is in that time"):
+        readings(silent, 1, end=20.0)
+
+
 # --- what is missing is named ----------------------------------------------------------
 
 
@@ -134,7 +154,7 @@ def test_no_attitude_is_named(recording, attitude):
 
 def test_a_time_without_readings_is_named(recording):
     with pytest.raises(MissingDataError, match="usable readings of compass 1"):
-        readings(recording, 1, start=1000.0)
+        readings(recording, 1, start=59.99)
 
 
 def test_a_motor_correction_in_force_without_its_control_quantity_is_named():

@@ -102,7 +102,7 @@ def test_offsets_are_written_wherever_a_motor_vector_is(name):
 
 
 def test_offsets_learned_in_the_hover_give_back_the_interference_they_swallowed():
-    """AUTOPILOTS.md, Learning: when MOT is added, OFS must be re-centred."""
+    """docs/autopilots.md, ArduPilot: learning: when MOT is added, OFS must be re-centred."""
     hover = 25.0
     learned = replace(
         EXACT,

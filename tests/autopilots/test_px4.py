@@ -178,12 +178,18 @@ def test_an_offset_too_near_to_be_noticed_turns_the_heading_little(away, restart
     turn = sensor_to_body(before, 1)
     present = PX4.in_force(before, 1).correction
     moved = Correction(present.offset - 1000.0 * turn @ away, present.soft_iron, np.ones(3))
-    written = PX4.correction_parameters(moved, 1, before, regressor=CURRENT, soft_iron_fitted=False)
+    written = PX4.correction_parameters(
+        moved, 1, before, regressor=CURRENT, soft_iron_fitted=False, usual=20.0
+    )
     written["CAL_MAG_COMP_TYP"] = 2.0
     firmware = in_the_firmware(before, written, 1, restarted=restarted)
-    missed = body_correction(firmware, turn).offset - moved.offset
+    applied = body_correction(firmware, turn)
     # All of it would be up to 5 mGauss level, 1.3° at 216 mGauss of horizontal field.
-    assert np.hypot(*missed[:2]) < 2.0
+    assert np.hypot(*(applied.offset - moved.offset)[:2]) < 3.6
+    raw = np.array([[200.0, -100.0, 400.0]])
+    hover, top = np.array([20.0]), np.array([40.0])
+    assert np.allclose(applied.apply(raw, hover), moved.apply(raw, hover), atol=1e-3)
+    assert np.abs(applied.apply(raw, top) - moved.apply(raw, top)).max() < 6.0
 
 
 def test_a_compass_whose_calibration_is_right_keeps_it_to_the_last_bit():
@@ -350,7 +356,11 @@ def test_a_recording_without_parameters_is_refused_with_what_to_give() -> None:
         PX4.require_fittable(recording("", ParameterHistory()))
 
 
-@given(numbers, st.sampled_from([math.nan, math.inf]), st.sampled_from(["COMP", "OFF", "SCALE"]))
+@given(
+    numbers,
+    st.sampled_from([math.nan, math.inf, 3e38, -1e9]),
+    st.sampled_from(["COMP", "OFF", "SCALE"]),
+)
 def test_a_value_that_is_none_leaves_out_its_own_compass_alone(number, value, kind):
     bad = vector_names(kind, number)[1]
     values = {**held(1), **held(2), **held(3), **held(4), bad: value}
@@ -361,11 +371,11 @@ def test_a_value_that_is_none_leaves_out_its_own_compass_alone(number, value, ki
 
 
 def test_a_compass_without_a_slot_and_one_turned_inside_out_are_left_out():
-    values = {**held(1), **held(2, ODIAG=(1.5, 0.0, 0.0))}
+    values = {**held(1), **held(2, ODIAG=(1.5, 0.0, 0.0)), **held(3, SCALE=(1e-30, 1.0, 1.0))}
     found = PX4.left_out(history((0.0, values)))
     assert set(found) == {2, 3, 4}
-    assert "CAL_MAG2_ID is 0" in str(found[3])
-    assert "CAL_MAG1" in str(found[2])
+    assert "CAL_MAG3_ID is 0" in str(found[4])
+    assert all(f"CAL_MAG{n - 1}" in str(found[n]) for n in (2, 3))
 
 
 def test_what_a_log_does_not_tell_is_named():

@@ -88,3 +88,21 @@ def test_a_vehicle_that_listens_to_one_ground_station_says_how_to_be_that_one(ba
         assert held(vehicle) == before
         arguments = ["--yes", "--source-system", "200"]
         assert run(["restore", str(backup), flown.address, *arguments]) == ExitCode.GOOD
+
+
+def test_an_error_while_a_vehicle_is_written_says_what_the_vehicle_holds(
+    backup, capsys, monkeypatch
+):
+    def fails(self, lasting, passing=""):
+        if lasting == "writing":
+            raise RuntimeError("the terminal is gone")
+
+    monkeypatch.setattr("magcomp.cli.linking.StatusLine.show", fails)
+    vehicle = landed(seed=4, parameters={"COMPASS_MOT_X": 3.0})
+    before = held(vehicle)
+    with alive(vehicle=vehicle) as flown:
+        assert run(["restore", str(backup), flown.address, "--yes"]) == ExitCode.USAGE
+    said = capsys.readouterr().err
+    assert "the terminal is gone" in said
+    assert "while the vehicle was written: the vehicle holds everything as before" in said
+    assert held(vehicle) == before

@@ -1,4 +1,4 @@
-"""Equations 8 to 11 of PAPER.md against finite differences of the heading itself."""
+"""docs/method.md, Equations 8 to 11 against finite differences of the heading itself."""
 
 import numpy as np
 import pytest

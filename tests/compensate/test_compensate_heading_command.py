@@ -4,6 +4,8 @@ import json
 
 import numpy as np
 import pytest
+from logs_made_of_logs import COMPASSES as GYRO
+from logs_made_of_logs import CURRENT, SWEEP, THROTTLE, frames, write
 from truth import FIXTURES
 
 from magcomp.analysis import Options, analyse
@@ -70,6 +72,29 @@ def test_a_parameter_file_corrects_as_the_fit_it_came_from(parameters, capsys):
 def test_a_correction_in_force_leaves_the_reported_heading_as_it_is(capsys):
     error = document(capsys, FLIGHT, "--in-force")["error_deg"]
     assert error["corrected"]["rms"] == pytest.approx(error["raw"]["rms"], abs=0.1)
+
+
+def test_a_gap_in_the_telemetry_costs_its_readings_and_nothing_else(tmp_path, capsys):
+    began = next(frames(SWEEP)).arrival_us
+    log = write(
+        tmp_path / "gap.tlog",
+        (
+            frame
+            for frame in frames(SWEEP)
+            if frame.message not in CURRENT | THROTTLE or not 40e6 < frame.arrival_us - began < 58e6
+        ),
+    )
+    found = document(capsys, str(log))["headings"]
+    time = np.array(found["raw"]["time_s"])
+    assert len(found["raw"]["deg"]) == len(time) == len(found["corrected"]["deg"])
+    assert np.diff(time).max() > 15.0
+
+
+def test_a_gyro_that_is_hardly_told_gives_no_fused_heading(tmp_path, capsys):
+    slow = (f for k, f in enumerate(frames(SWEEP)) if f.message not in GYRO or k % 400 == 0)
+    log = write(tmp_path / "slow.tlog", slow)
+    assert run(["heading", str(log), "--in-force"]) in (0, 2)
+    assert "should not have happened" not in capsys.readouterr().err
 
 
 def test_the_text_tells_the_error_and_the_plot_draws_it(capsys):

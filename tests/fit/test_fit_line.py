@@ -122,7 +122,7 @@ def test_feet_and_distances_are_pythagoras(seed):
     assert np.allclose(squares, np.sum((centres - line.point) ** 2, axis=1))
 
 
-# --- the paper's iteration, PAPER.md 14–16 ---------------------------------------------
+# --- the paper's iteration, docs/method.md, Equations 14 to 16 ---------------------
 
 
 @pytest.mark.parametrize("seed", range(2))

@@ -22,6 +22,7 @@ from magcomp.errors import ExitCode, LinkError, LinkTimeoutError, OutputError
 from magcomp.link import Recorder, connect
 from magcomp.link.address import Replay, SerialLine, TcpClient, TcpServer, UdpClient, UdpServer
 from magcomp.link.clock import SystemClock
+from magcomp.link.connection import Connection
 from magcomp.link.events import GapEnded, GapStarted, SinkFailed
 from magcomp.link.opening import open_transport
 from magcomp.link.replay import records
@@ -392,3 +393,65 @@ def test_a_dead_transport_is_told_from_a_silent_one():
     transport.close()
     with pytest.raises(TransportClosedError):
         transport.read(0.1)
+
+
+class StalledTransport:
+    """A line that takes nothing until it is let go."""
+
+    answers = True
+    peer = None
+
+    def __init__(self):
+        self.clock = SystemClock()
+        self.stalled, self.go_on = threading.Event(), threading.Event()
+
+    def read(self, timeout):
+        return b""
+
+    def write(self, data):
+        self.stalled.set()
+        self.go_on.wait(60.0)
+
+    def keep_to(self, peer):
+        pass
+
+    def close(self):
+        self.go_on.set()
+
+
+def test_a_line_that_takes_nothing_does_not_keep_the_screen_waiting():
+    transport = StalledTransport()
+    connection = Connection(UdpServer("127.0.0.1", 1), lambda: transport)
+    try:
+        assert transport.stalled.wait(60.0)
+        asked = threading.Thread(target=connection.statistics, daemon=True)
+        asked.start()
+        asked.join(30.0)
+        assert not asked.is_alive()
+        assert not transport.go_on.is_set()
+    finally:
+        transport.go_on.set()
+        connection.close()
+
+
+def test_a_disk_that_takes_nothing_does_not_keep_the_screen_waiting():
+    stalled, go_on = threading.Event(), threading.Event()
+
+    class Sink:
+        def add(self, unix_us, frame):
+            stalled.set()
+            go_on.wait(60.0)
+
+    vehicle = FakeVehicle()
+    with connect(UdpServer("127.0.0.1", 0), sinks=[Sink()]) as connection:
+        client = UdpTransport(UdpClient("127.0.0.1", connection._transport.port), SystemClock())
+        try:
+            client.write(vehicle.heartbeat())
+            assert stalled.wait(60.0)
+            asked = threading.Thread(target=connection.statistics, daemon=True)
+            asked.start()
+            asked.join(30.0)
+            assert not asked.is_alive()
+        finally:
+            go_on.set()
+            client.close()

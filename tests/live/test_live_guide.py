@@ -62,6 +62,14 @@ def test_what_was_enough_stays_enough_whatever_comes_after(situation):
     assert said.share_done == 1.0
 
 
+def test_only_who_has_flown_everything_can_be_told_that_a_compass_is_rejected():
+    begun = view(Situation.FLYING, coverage=throttles_flown({0, 1}), seconds=30.0)
+    assert guide(replace(begun, grade=Grade.REJECTED)).early
+    flown = replace(begun, coverage=throttles_flown(range(SECTORS)), seconds=90.0)
+    assert not guide(replace(flown, grade=Grade.REJECTED)).early
+    assert guide(view(Situation.GROUND)).early
+
+
 def test_a_disarmed_stand_is_never_told_to_raise_the_throttle():
     held = coverage(l0=[0], l1=[0], l2=[0], l3=[0], l4=[0])
     for grade in (None, Grade.MARGINAL, Grade.REJECTED):

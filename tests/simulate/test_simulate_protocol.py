@@ -1,4 +1,4 @@
-"""The simulated autopilot answers as AUTOPILOTS.md says ArduPilot does, rule by rule."""
+"""The simulated autopilot's rules, one by one: docs/autopilots.md, ArduPilot: parameters."""
 
 from __future__ import annotations
 

@@ -110,6 +110,16 @@ def test_what_was_applied_is_known_per_reading_and_to_its_fraction(flown: Record
     np.testing.assert_allclose(applied.motor.value[0], (3.5, 0.0, -2.5))
 
 
+def test_a_fraction_that_changes_holds_from_its_change_on(tmp_path: Path) -> None:
+    log = short_flight(4.0)
+    at = len(log.rows) // 2
+    stamp = next(values[0] for form, values in log.rows[at:] if form is MAG)
+    log.rows.insert(at, (PARM, (stamp - 50, "COMPASS_OFS_X", 12.25)))
+    applied = from_bytes(tmp_path, log.binary()).applied[1].offset
+    assert set(applied.value[:, 0]) == {12.25, 12.75}
+    assert (np.diff(applied.value[:, 0]) <= 0).all()
+
+
 def test_compasses_of_old_firmware_have_messages_of_their_own(tmp_path: Path) -> None:
     kinds, columns = "IhhhhhhhhhB", MAG.columns.replace("US,I,", "MS,").replace("MO", "MOfs")[:-2]
     forms = [Form(100 + n, f"MAG{n or ''}".replace("1", "2"), kinds, columns) for n in (0, 1)]

@@ -318,6 +318,21 @@ def test_the_version_message_is_believed_before_the_banner() -> None:
     assert recording.vehicle.firmware == "4.6.3"
 
 
+def test_the_flight_controllers_number_is_taken_from_what_it_says_of_itself() -> None:
+    sender = Sender()
+    banner = sender.text("CubeOrange 00510027 33355115 31373937")
+    number = "270051001551353337393731"
+    assert recording_of(banner).vehicle.uid == number
+    assert recording_of(sender.text("fmuv5 00000000 00000000 00000000")).vehicle.uid == ""
+    told = [0x0A, 0x0B, *[0] * 16]
+    for uid2, expected in ((told, "0a0b"), ([0] * 18, number)):
+        version = dialect.MAVLink_autopilot_version_message(
+            0, 0, 0, 0, 140 << 16, bytes(8), bytes(8), bytes(8), 0, 0, 0, uid2
+        )
+        vehicle = recording_of(sender.frame(version), banner).vehicle
+        assert (vehicle.uid, vehicle.board) == (expected, "board 140")
+
+
 @pytest.mark.parametrize(
     ("mav_type", "kind"),
     [

@@ -106,6 +106,25 @@ def test_a_reboot_begins_a_new_stretch_after_the_gap_the_recorder_saw() -> None:
     assert np.delete(np.diff(series.time), 49) == pytest.approx(0.1)
 
 
+def test_a_leap_of_the_vehicles_clock_takes_no_longer_than_the_recorder_waited() -> None:
+    sender = Sender()
+    frames = [sender.heartbeat()]
+    for n in range(60):
+        ms = 60_000 + 100 * n + (3_600_000 if n >= 30 else 0)
+        frames += [sender.attitude(ms), sender.raw_imu(ms * 1000)]
+    recording = read(log(frames, lambda n: n * 50_000))
+    assert np.diff(attitude(recording).time) == pytest.approx(0.1)
+    assert recording.field[1].time == pytest.approx(attitude(recording).time, abs=0.1)
+
+
+def test_an_hour_without_a_link_stays_an_hour() -> None:
+    sender = Sender()
+    frames = [sender.heartbeat()]
+    frames += [sender.attitude(100 * n + (3_600_000 if n >= 30 else 0)) for n in range(1, 60)]
+    recording = read(log(frames, lambda n: n * 100_000 + (3600 * SECOND if n >= 30 else 0)))
+    assert np.diff(attitude(recording).time).max() == pytest.approx(3600.1)
+
+
 def test_frames_that_took_a_longer_way_are_no_reboot() -> None:
     sender = Sender()
     stamps = [5000 + 100 * n for n in range(100)]

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
+import made
 import numpy as np
 import pytest
 import scripted
@@ -13,8 +15,11 @@ from scripted import press, screen, until
 from textual.widgets import Input
 from truth import FIXTURES
 
+from magcomp.analysis import Options
 from magcomp.cli.app import app as command_line
+from magcomp.errors import MissingDataError
 from magcomp.fit import METHODS
+from magcomp.tui import fitting
 from magcomp.tui.fits import fit_rows
 from magcomp.tui.screens.dialogs import Confirm, Message
 from magcomp.writing.files import read_parameter_file
@@ -26,8 +31,10 @@ async def opened(pilot) -> None:
     await until(pilot, lambda: pilot.app.work.card is not None and pilot.app.busy is None)
 
 
-async def fitted(pilot) -> None:
+async def fitted(pilot, compass: int | None = 1) -> None:
+    """With the log fitted: one compass, because three take three times as long."""
     await opened(pilot)
+    pilot.app.set_work(replace(pilot.app.work, options=Options(compass=compass)))
     await press(pilot, "n")
     await until(pilot, lambda: pilot.app.work.analysis is not None)
 
@@ -50,7 +57,7 @@ async def test_a_log_named_on_the_command_line_is_open_at_once(tmp_path):
 
 async def test_what_the_screen_shows_is_what_fit_json_prints(tmp_path, json_answer):
     async with scripted.app(tmp_path, str(SWEEP)).run_test(size=(120, 60)) as pilot:
-        await fitted(pilot)
+        await fitted(pilot, compass=None)
         for compass in json_answer["compasses"]:
             await press(pilot, str(compass["compass"]))
             await pilot.pause()
@@ -72,7 +79,7 @@ async def test_what_the_screen_shows_is_what_fit_json_prints(tmp_path, json_answ
 
 async def test_every_option_can_be_changed_and_fits_again_at_once(tmp_path):
     async with scripted.app(tmp_path, str(SWEEP)).run_test() as pilot:
-        await fitted(pilot)
+        await fitted(pilot, compass=None)
         await press(pilot, "c")
         assert [c.fit.compass for c in pilot.app.work.analysis.compasses] == [1]
         await press(pilot, "m")
@@ -133,14 +140,45 @@ async def test_fits_of_two_time_ranges_stand_side_by_side_and_either_can_be_show
         assert 0.0 < rows[2].apart < 1.0
 
 
-async def test_every_method_is_reached_and_one_that_cannot_fit_does_not_end_the_round(tmp_path):
-    async with scripted.app(tmp_path, str(SWEEP)).run_test() as pilot:
+async def test_a_time_range_is_chosen_by_eye_with_the_arrow_keys(tmp_path):
+    app = scripted.app(tmp_path, str(SWEEP))
+    async with app.run_test() as pilot:
         await fitted(pilot)
+        await pilot.press("t")
+        await until(pilot, lambda: "━" * 60 in scripted.picture(app))
+        await press(pilot, *["up"] * 10, "tab", *["down"] * 10)
+        first, last = (float(field.value) for field in app.screen.query(Input))
+        whole = app.work.recording.duration_s
+        assert first == pytest.approx(whole / 6.0, abs=6.0)
+        assert last == pytest.approx(5.0 * whole / 6.0, abs=6.0)
+        strip = next(
+            line for line in scripted.picture(app).splitlines() if "━·" in line and "·━" in line
+        )
+        assert strip.count("━") == pytest.approx(
+            strip.count("·") * (last - first) / (whole - last + first), abs=3
+        )
+
+
+async def test_every_method_is_reached_and_one_that_cannot_fit_does_not_end_the_round(
+    tmp_path, monkeypatch
+):
+    def fit(_recording, options, _progress):
+        if options.method in ("levels", "flight"):
+            raise MissingDataError(f"{options.method} must have turns; instead there are none")
+        return made.analysis(), made.pictures(made.analysis())
+
+    monkeypatch.setattr(fitting, "fit", fit)
+    app = scripted.app(tmp_path)
+    async with app.run_test() as pilot:
+        await until(pilot, lambda: app.choices)
+        app.set_work(made.work())
+        app.action_go("fit")
+        await until(pilot, lambda: "Heading error" in screen(app))
         tried = []
         for _ in METHODS:
             await press(pilot, "m")
-            tried.append(pilot.app.asked.method)
-            if isinstance(pilot.app.screen, Message):
+            tried.append(app.asked.method)
+            if isinstance(app.screen, Message):
                 await press(pilot, "enter")
         assert sorted(tried) == sorted(METHODS)
 
@@ -165,7 +203,7 @@ async def test_the_report_of_what_is_shown_is_saved_and_told_of_on_leaving(tmp_p
 
 async def test_the_difference_can_be_saved_and_is_what_was_shown(tmp_path):
     async with scripted.app(tmp_path, str(SWEEP)).run_test() as pilot:
-        await fitted(pilot)
+        await fitted(pilot, compass=None)
         await press(pilot, "n", "3", "s")
         path = tmp_path / "compass.param"
         pilot.app.screen.query_one(Input).value = str(path)

@@ -170,6 +170,19 @@ async def test_a_compass_is_not_rejected_before_enough_is_recorded(tmp_path):
         await until(pilot, lambda: "REJECTED" in screen(pilot.app))
 
 
+async def test_a_fit_that_is_tried_too_early_is_not_called_rejected(tmp_path):
+    session = ScriptedSession()
+    async with scripted.app(tmp_path, session=session).run_test() as pilot:
+        await connected(pilot)
+        pilot.app.set_work(made.work(Grade.REJECTED, live=True))
+        pilot.app.action_go("fit")
+        await until(pilot, lambda: "Too early for compass 1: The current" in screen(pilot.app))
+        assert "[1] … too early" in screen(pilot.app)
+        assert "press B, record more" in screen(pilot.app)
+        session.change(guidance=Guidance("that is enough", 1.0, enough=True))
+        await until(pilot, lambda: "Compass 1 is rejected: The current" in screen(pilot.app))
+
+
 async def test_a_bad_address_is_told_and_what_was_typed_can_be_mended(tmp_path):
     async with scripted.app(tmp_path).run_test() as pilot:
         await until(pilot, lambda: pilot.app.choices)

@@ -1,7 +1,7 @@
 """A small ArduPilot for parameters, a lossy network and a clock that only these move.
 
-Faithful to AUTOPILOTS.md: silence for unknown names and non-finite values,
-echoes with index 65535 that bring the siblings of a vector along, read-only
+Faithful to docs/autopilots.md, ArduPilot: parameters: silence for unknown names and
+non-finite values, echoes with index 65535 that bring the siblings of a vector along, read-only
 names, parameters that hide, and two memories: what is in force, and what a
 reboot brings back, into which writes go some time later and in any order.
 """

@@ -1,4 +1,6 @@
-"""A small PX4 for parameters (PX4_FACTS.md): integers as bytes, one echo with its true index.
+"""A small PX4 for parameters: integers as bytes, one echo with its true index.
+
+Faithful to docs/autopilots.md, PX4: parameters.
 
 It saves everything at once, some time after a change, and not again for two seconds.
 """

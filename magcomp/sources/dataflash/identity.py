@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from magcomp.mavlink.version import number_in_words
 from magcomp.sources.dataflash.table import Tables
 
 _KINDS = {
@@ -57,7 +58,7 @@ def identify(tables: Tables, preface: str, values: Mapping[str, float]) -> Ident
         if banner := _BANNER.search(line):
             found = replace(found, kind=_KINDS[banner[1].lower()], firmware=banner[2])
         elif board := _BOARD.fullmatch(line):
-            found = replace(found, board=board[1], uid=_serial(board[2]))
+            found = replace(found, board=board[1], uid=number_in_words(board[2]))
         elif frame := _FRAME.match(line):
             found = replace(found, frame=frame[1])
     found = replace(found, firmware=_version(tables) or found.firmware)
@@ -74,12 +75,6 @@ def _words(tables: Tables, preface: str) -> Iterable[str]:
         yield from tables["VER"].texts("FWS")
     if "MSG" in tables:
         yield from tables["MSG"].texts("Message")
-
-
-def _serial(words: str) -> str:
-    """As AUTOPILOT_VERSION.uid2 has it; empty where nothing but zeros was left of it."""
-    number = b"".join(bytes.fromhex(word)[::-1] for word in words.split()).rstrip(b"\0")
-    return number.hex()
 
 
 def _version(tables: Tables) -> str:

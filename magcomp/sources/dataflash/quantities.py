@@ -67,7 +67,11 @@ def compasses(log: Log) -> dict[int, Readings]:
             continue
         time, table = log.times[name], log.tables[name]
         value = table.matrix("MagX", "MagY", "MagZ")
-        sound = np.isfinite(value).all(axis=1) & (value != 0).any(axis=1)
+        # Damaged fractions may be as large as a number can be.
+        with np.errstate(over="ignore"):
+            square = np.einsum("ij,ij->i", value, value)
+        # NaN fails both.
+        sound = (square > 0.0) & (square < np.inf)
         if "Health" in table.names:
             sound &= table.numbers("Health") != 0
         offset, motor = (
@@ -163,7 +167,8 @@ def outputs(log: Log) -> Series | None:
     kept = _in_order(time, np.ones(len(time), dtype=bool))
     if not len(kept):
         return None
-    value = np.zeros((len(kept), _MOST_OUTPUTS))
+    most = _MOST_OUTPUTS if any(name in log.tables for name, _ in _OUTPUTS[1:]) else _FEWEST_OUTPUTS
+    value = np.zeros((len(kept), most))
     for name, before in _OUTPUTS:
         found = log.get(name)
         if found is None:
@@ -172,7 +177,7 @@ def outputs(log: Log) -> Series | None:
         if not len(own):
             continue
         at = own if name == "RCOU" else own[_latest(found[0][own], time[kept])]
-        for channel in range(before, _MOST_OUTPUTS):
+        for channel in range(before, most):
             column = found[1].first_of(*(f"{prefix}{channel + 1}" for prefix in _OUTPUT_NAMES))
             if column is not None:
                 value[:, channel] = found[1].numbers(column)[at]

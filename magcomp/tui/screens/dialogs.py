@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, TypeVar
 
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Horizontal, Vertical, VerticalScroll
 from textual.screen import ModalScreen
-from textual.widgets import Button, Input, Label, Markdown, Static
+from textual.widget import Widget
+from textual.widgets import Button, Input, Label, Static
+
+Answer = TypeVar("Answer")
 
 
-class Message(ModalScreen[None]):
+class Dialog(ModalScreen[Answer]):
+    """What the questions have in common: on a low terminal they leave out air, never a line."""
+
+    VERTICAL_BREAKPOINTS = [(0, "-short"), (32, "-tall")]  # noqa: RUF012 - as in Screen
+
+
+class Message(Dialog[None]):
     """A sentence and the next step; Enter goes on.
 
     Parameters
@@ -42,7 +51,7 @@ class Message(ModalScreen[None]):
         self.dismiss()
 
 
-class Confirm(ModalScreen[bool]):
+class Confirm(Dialog[bool]):
     """A question whose safe answer is the default.
 
     Parameters
@@ -119,7 +128,7 @@ class Fault:
     sentence: str
 
 
-class AskText(ModalScreen["tuple[str, ...] | None"]):
+class AskText(Dialog["tuple[str, ...] | None"]):
     """One or two lines of text; Escape gives None.
 
     Parameters
@@ -151,6 +160,7 @@ class AskText(ModalScreen["tuple[str, ...] | None"]):
         with Vertical(classes="dialog") as dialog:
             dialog.border_title = self._title
             yield Static(self._explanation, markup=False, classes="sentence")
+            yield from self.body()
             for label, value in self._fields:
                 yield Label(label)
                 yield Input(value, select_on_focus=True)
@@ -162,6 +172,10 @@ class AskText(ModalScreen["tuple[str, ...] | None"]):
     def on_mount(self) -> None:
         """Begin in the first line."""
         self.query(Input).first().focus()
+
+    def body(self) -> Iterable[Widget]:
+        """What stands between the explanation and the lines."""
+        return ()
 
     def action_cancel(self) -> None:
         """Leave everything as it is."""
@@ -188,7 +202,7 @@ class AskText(ModalScreen["tuple[str, ...] | None"]):
         self.query(Input)[fault.line].focus()
 
 
-class Help(ModalScreen[None]):
+class Help(Dialog[None]):
     """Help for what has the focus, and the keys of the screen with their names.
 
     Parameters
@@ -207,6 +221,8 @@ class Help(ModalScreen[None]):
 
     def compose(self) -> ComposeResult:
         """The text in a scroll."""
+        from textual.widgets import Markdown  # noqa: PLC0415 - its parser is slow to import
+
         with Vertical(classes="dialog tall") as dialog:
             dialog.border_title = "Help"
             dialog.border_subtitle = "Esc closes"

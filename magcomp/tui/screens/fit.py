@@ -17,12 +17,12 @@ from magcomp.model import CURRENT, Analysis, Grade
 from magcomp.report import words
 from magcomp.tui.fits import fit_rows, time_range
 from magcomp.tui.messages import OptionsChosen, TimeRangeWanted
-from magcomp.tui.pictures import AXES, CompassPicture
+from magcomp.tui.pictures import AXIS_WORDS, CompassPicture
 from magcomp.tui.screens.step import StepScreen
 from magcomp.tui.widgets.fits_table import FitsTable
 from magcomp.tui.widgets.heading_table import HeadingTable
 from magcomp.tui.widgets.plots import ShiftPlot, UnexplainedPlot
-from magcomp.tui.widgets.verdict_text import ReasonLine, VerdictText, grade_word
+from magcomp.tui.widgets.verdict_text import ReasonLine, VerdictText, grade_so_far
 
 VIEWS = {
     "heading": "Heading error",
@@ -123,8 +123,9 @@ and C change method, regressor, time range and compasses, and fit again at once;
         if self._compass not in pictures:
             self._compass = min(pictures)
         shown = pictures[self._compass]
-        self.query_one("#grades", Static).update(grades_line(analysis, self._compass))
-        self.query_one(ReasonLine).show(shown.result)
+        early = self.state.early
+        self.query_one("#grades", Static).update(grades_line(analysis, self._compass, early=early))
+        self.query_one(ReasonLine).show(shown.result, early=early)
         if self._drawn == (shown, analysis):
             return
         if self._drawn is None:
@@ -142,7 +143,7 @@ and C change method, regressor, time range and compasses, and fit again at once;
             f"unseen {residual.held_out:.1f}"
         )
         self.query_one("#view-unexplained").border_subtitle = "x now   • corrected"
-        axes = zip(AXES, shown.result.fit.interference, strict=True)
+        axes = zip(AXIS_WORDS, shown.result.fit.interference, strict=True)
         each = "  ".join(f"{axis} {words.number(float(value))}" for axis, value in axes)
         per = "per A" if shown.result.fit.regressor == CURRENT else "at full"
         self.query_one("#view-shift").border_subtitle = f"{each}  {per}"
@@ -157,8 +158,7 @@ and C change method, regressor, time range and compasses, and fit again at once;
         if analysis is None:
             return "Press F to fit what was recorded."
         if analysis.grade is Grade.REJECTED:
-            live = self.state.live
-            if live is not None and not live.guidance.enough:
+            if self.state.early:
                 return "Too early for an answer: press B, record more, then press N and F."
             return "Do what the first line says, record again, and fit again. M: other method."
         return "Look at the pictures (V), then press N to see what would be written."
@@ -231,14 +231,15 @@ def options_line(options: Options, analysis: Analysis | None, keys: Sequence[str
     return Content(" ").join(texts)
 
 
-def grades_line(analysis: Analysis, shown: int) -> Content:
+def grades_line(analysis: Analysis, shown: int, *, early: bool = False) -> Content:
     """The grade of each compass; the one shown is in brackets and reversed."""
     parts = []
     for result in analysis.compasses:
         number = result.fit.compass
         here = number == shown
         name = Content.styled(f"[{number}]" if here else f" {number} ", "reverse" if here else "")
-        parts.append(Content.assemble(" ", name, " ", grade_word(result.verdict.grade)))
+        word = grade_so_far(result.verdict.grade, early=early)
+        parts.append(Content.assemble(" ", name, " ", word))
     return Content.assemble(Content.styled(" Compass", "$quiet"), *parts)
 
 

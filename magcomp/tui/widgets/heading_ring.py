@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from textual.content import Content
@@ -105,7 +107,13 @@ class _Canvas:
 
     def content(self) -> Content:
         """All of it."""
-        return Content("\n").join(Content.assemble(*row) for row in self._cells)
+        return Content("\n").join(Content.assemble(*_runs(row)) for row in self._cells)
+
+
+def _runs(row: list[tuple[str, str]]) -> Iterator[tuple[str, str]]:
+    """Neighbours of one style as one text: a ring is drawn ten times a second."""
+    for style, cells in itertools.groupby(row, key=lambda cell: cell[1]):
+        yield "".join(sign for sign, _ in cells), style
 
 
 def _cell(best: int | None, most: int) -> tuple[str, str]:

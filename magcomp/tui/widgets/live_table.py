@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from textual.content import Content
 
 from magcomp.live.snapshot import CompassNow, LiveSnapshot
-from magcomp.model import Grade
 from magcomp.tui.widgets.bars import bar
 from magcomp.tui.widgets.drawn import Drawn
-from magcomp.tui.widgets.verdict_text import grade_word
+from magcomp.tui.widgets.verdict_text import grade_so_far
 
 _POINTS = ("N", "NE", "E", "SE", "S", "SW", "W", "NW")
 _FULL_MGAUSS = 900.0
@@ -46,7 +45,7 @@ is.
 
     def show(self, live: LiveSnapshot) -> None:
         """Draw every compass that reports."""
-        self.draw_data(Compasses(live.compasses, not live.guidance.enough))
+        self.draw_data(Compasses(live.compasses, live.guidance.early))
 
     def picture(self, data: Compasses, width: int, height: int) -> Content:  # noqa: ARG002
         """A line a compass."""
@@ -65,7 +64,7 @@ is.
             f" {mark}   {compass.number}     {compass.strength:5.0f} mG ",
             bar(compass.strength / _FULL_MGAUSS, width, style=style),
             f"  {direction(compass.heading_deg)}   {direction(compass.heading_corrected_deg)}  ",
-            _grade(compass.grade, early=early),
+            Content("–") if compass.grade is None else grade_so_far(compass.grade, early=early),
         )
 
 
@@ -118,15 +117,6 @@ moves with one of them.
             ),
         ]
         return Content("\n").join(lines)
-
-
-def _grade(grade: Grade | None, *, early: bool) -> Content:
-    """The judge's word; who has recorded too little is not told that a compass is rejected."""
-    if grade is None:
-        return Content("–")
-    if grade is Grade.REJECTED and early:
-        return Content("… too early")
-    return grade_word(grade)
 
 
 def _control(

@@ -1,6 +1,6 @@
 """The pictures of a fit, drawn with plotext.
 
-Every series has its own sign (x, y, z; dots and crosses), so that a screen without colours, or a
+Every series has its own sign (f, r, d; dots and crosses), so that a screen without colours, or a
 pilot who sees none, reads the same.
 """
 
@@ -12,7 +12,7 @@ from textual_plotext import PlotextPlot
 from magcomp.tui.pictures import AXES, Shift, Unexplained, round_ticks
 
 AXIS_COLOURS = ("error", "success", "primary")
-"""Of x, y and z, as names in the theme; the letters say the same."""
+"""Of forward, right and down, as names in the theme; the letters say the same."""
 
 
 class Picture(PlotextPlot):
@@ -61,7 +61,7 @@ class ShiftPlot(Picture):
 
     HELP = """\
 **What the motors add** – the paper's picture. Each letter is the measured shift of the field's
-centre along one axis of the vehicle (x forward, y right, z down), and each line is the fit.
+centre along one axis of the vehicle (f forward, r right, d down), and each line is the fit.
 
 Letters that lie on their lines mean that one number per axis is enough, and that the autopilot can
 take the shift out.

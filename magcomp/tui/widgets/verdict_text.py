@@ -25,21 +25,28 @@ def grade_word(grade: Grade) -> Content:
     return Content.styled(f"{MARKS[grade]} {grade.value.upper()}", f"bold {STYLES[grade]}")
 
 
-class ReasonLine(Drawn[tuple[int, Grade, str]]):
+def grade_so_far(grade: Grade, *, early: bool) -> Content:
+    """The judge's word; who has recorded too little is not told that a compass is rejected."""
+    return Content("… too early") if early and grade is Grade.REJECTED else grade_word(grade)
+
+
+class ReasonLine(Drawn[tuple[str, Grade, str]]):
     """Why a pilot should write a compass's fit, or must not: before any number."""
 
     SETS_HEIGHT = True
 
-    def show(self, result: CompassResult) -> None:
-        """Draw the first reason of one compass."""
-        reasons = result.verdict.reasons
+    def show(self, result: CompassResult, *, early: bool) -> None:
+        """Draw the first reason of one compass; ``early`` as for :func:`grade_so_far`."""
+        reasons, grade = result.verdict.reasons, result.verdict.grade
         text = words.sentence(reasons[0]) if reasons else ""
-        self.draw_data((result.fit.compass, result.verdict.grade, text))
+        title = "" if grade is Grade.GOOD else f"Compass {result.fit.compass} is {grade.value}: "
+        if early and grade is Grade.REJECTED:
+            title = f"Too early for compass {result.fit.compass}: "
+        self.draw_data((title, grade, text))
 
-    def picture(self, data: tuple[int, Grade, str], width: int, height: int) -> Content:  # noqa: ARG002
+    def picture(self, data: tuple[str, Grade, str], width: int, height: int) -> Content:  # noqa: ARG002
         """One line or two; what does not fit stands in the verdict."""
-        compass, grade, reason = data
-        title = "" if grade is Grade.GOOD else f"Compass {compass} is {grade.value}: "
+        title, grade, reason = data
         lines = textwrap.wrap(
             f"{title}{reason}", max(width - 2, 20), max_lines=2, placeholder=" … (V: verdict)"
         )

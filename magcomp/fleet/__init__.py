@@ -1,0 +1,1 @@
+"""Many logs: every one read once, and put together by aircraft."""

@@ -1,0 +1,91 @@
+"""Motor vectors of several flights: the true mean, the true scatter, and changes that are real."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import special
+
+from magcomp.fleet.pooled import SURE, chances_apart, change, pool
+
+TRUTH = np.array([-1.4, 0.8, -1.9])
+
+
+def flights(
+    rng: np.random.Generator, count: int, scatter: float = 0.0
+) -> tuple[np.ndarray, np.ndarray]:
+    """Motor vectors with covariances of all shapes and of very different sizes."""
+    roots = rng.normal(size=(count, 3, 3)) * rng.uniform(0.01, 0.1, (count, 1, 1))
+    covariances = roots @ np.swapaxes(roots, 1, 2) + 1e-4 * np.eye(3)
+    noise = np.einsum("kij,kj->ki", np.linalg.cholesky(covariances), rng.normal(size=(count, 3)))
+    return TRUTH + noise + scatter * rng.normal(size=(count, 3)), covariances
+
+
+@pytest.mark.parametrize("scatter", [0.0, 0.3])
+def test_the_mean_is_as_far_from_the_truth_as_its_covariance_says(scatter: float) -> None:
+    rng = np.random.default_rng(1)
+    distances, scatters = [], []
+    for _ in range(200):
+        pooled = pool(*flights(rng, 12, scatter))
+        apart = pooled.motor - TRUTH
+        distances.append(apart @ np.linalg.solve(pooled.covariance, apart))
+        scatters.append(pooled.scatter)
+    inside = np.mean(np.array(distances) < special.chdtri(3, 0.05))
+    assert 0.88 < inside <= 0.99
+    assert np.mean(scatters) == pytest.approx(scatter, abs=0.03)
+
+
+def test_one_flight_is_its_own_mean() -> None:
+    motors, covariances = flights(np.random.default_rng(2), 1)
+    pooled = pool(motors, covariances)
+    np.testing.assert_allclose(pooled.motor, motors[0])
+    np.testing.assert_allclose(pooled.covariance, covariances[0])
+    assert pooled.scatter == 0.0
+
+
+@pytest.mark.parametrize("count", [3, 4, 9])
+def test_all_flights_at_once_as_one_after_the_other(count: int) -> None:
+    motors, covariances = flights(np.random.default_rng(count), count, 0.2)
+    chance, apart = chances_apart(motors, covariances)
+    for index in range(count):
+        others = np.arange(count) != index
+        rest = pool(motors[others], covariances[others])
+        spread = covariances[index] + rest.covariance + rest.scatter**2 * np.eye(3)
+        away = motors[index] - rest.motor
+        np.testing.assert_allclose(apart[index], away, rtol=1e-6, atol=1e-9)
+        expected = special.chdtrc(3, away @ np.linalg.solve(spread, away))
+        assert chance[index] == pytest.approx(expected, rel=1e-5)
+
+
+def test_mere_scatter_is_no_change() -> None:
+    rng = np.random.default_rng(3)
+    times = np.arange(10) * 86400.0
+    found = sum(change(times, *flights(rng, 10, 0.3)) is not None for _ in range(300))
+    # SURE for a drift, and as much for all the places of a step together.
+    assert found <= 300 * 2 * SURE + 3
+
+
+def test_a_step_is_found_where_it_is() -> None:
+    motors, covariances = flights(np.random.default_rng(4), 12, 0.05)
+    moved = np.array([0.0, 1.0, 0.5])
+    motors[7:] += moved
+    found = change(np.arange(12) * 86400.0, motors, covariances)
+    assert found is not None
+    assert (found.kind, found.first) == ("step", 7)
+    np.testing.assert_allclose(found.difference, moved, atol=0.15)
+
+
+def test_a_drift_is_no_step() -> None:
+    motors, covariances = flights(np.random.default_rng(5), 20)
+    share = np.linspace(0.0, 1.0, 20)
+    motors += np.multiply.outer(share, [1.0, 0.0, -2.0])
+    found = change(share * 1e7, motors, covariances)
+    assert found is not None
+    assert found.kind == "drift"
+    np.testing.assert_allclose(found.difference, [1.0, 0.0, -2.0], atol=0.1)
+
+
+def test_flights_of_one_moment_have_no_drift() -> None:
+    motors, covariances = flights(np.random.default_rng(6), 3, 5.0)
+    assert change(np.zeros(3), motors, covariances) is None
+    assert change(np.full(3, np.nan), motors, covariances) is None
