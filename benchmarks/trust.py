@@ -7,7 +7,7 @@ truth stays what the vehicle was drawn with, and nothing of it is seen by the fi
 
     python benchmarks/trust.py [--seeds 6] [--first 1] [--scale 1.0] [--programs flight,mission]
 
-Columns: compasses by verdict; *holds* the share of rows of the heading-error table up to the largest
+Columns: compasses by verdict; *holds* the share of rows of the table up to the largest
 current flown, whose error is within the stated 95 % bound, over accepted fits; *bound/error* its
 median; *wrong* goods that leave more than 2 degrees; *worse* accepted fits that raise the largest
 error; *error* the median and the 90 % quantile of the largest error over accepted fits, degrees.
