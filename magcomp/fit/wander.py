@@ -31,8 +31,8 @@ _DRIFT_MGAUSS = (0.2, 0.6, 1.5, 3.0, 6.0, 12.0)
 _DRIFT_S = (20.0, 60.0, 200.0)
 _CONTROL_SHARE = (0.001, 0.01, 0.03, 0.08, 0.15)
 _CONTROL_S = (1.0, 3.0, 10.0, 40.0)
-_LEAST_TILT_RAD, _LEAST_DRIFT_MGAUSS = np.radians(0.12), 0.7
-_LOSS_SCALE = 2.5
+_LEAST_TILT_RAD, _LEAST_DRIFT_MGAUSS = np.radians(0.12), 0.5
+_LOSS_SCALE = 4.0
 _STEPS = 4
 
 
@@ -296,7 +296,7 @@ def _weights(time: FloatArray, values: FloatArray) -> FloatArray:
     white = np.maximum(1.4826 * np.median(steps, axis=0) / np.sqrt(2.0), 0.2)
     centre = np.stack([_running_median(column) for column in values.T], axis=1)
     far = (values - centre) / white
-    return np.asarray(1.0 / np.sqrt(1.0 + (far / _LOSS_SCALE) ** 2) / white**2)
+    return np.asarray(1.0 / (1.0 + (far / _LOSS_SCALE) ** 2) / white**2)
 
 
 def _running_median(values: FloatArray, half: int = 7) -> FloatArray:

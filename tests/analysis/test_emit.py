@@ -50,7 +50,9 @@ def test_names_the_vehicle_never_reported_are_not_written(sweep):
         sweep,
         parameters=ParameterHistory(
             tuple(
-                c for c in sweep.parameters.changes if "DIA" not in c.name and "ODI" not in c.name
+                c
+                for c in sweep.parameters.changes
+                if not any(kind in c.name for kind in ("DIA", "ODI", "SCALE"))
             )
         ),
     )
