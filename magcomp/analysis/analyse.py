@@ -188,9 +188,9 @@ def check(recording: Recording, options: Options | None = None) -> Mapping[int, 
                 f"Compass {compass} is corrected by {kind}, so {recording.source} must hold the "
                 f"{kind}; instead it holds {', '.join(by_kind)}"
             )
-        verdicts[compass] = _in_words_of(
-            recording, judge_present(Problem(new, by_kind[kind], by_kind, earth))
-        )
+        problem = Problem(new, by_kind[kind], by_kind, earth)
+        verdict = judge_present(problem, complaints=_complaints(recording, compass, kind))
+        verdicts[compass] = _in_words_of(recording, verdict)
     return verdicts
 
 
@@ -224,11 +224,15 @@ def _one(
     new = readings(recording, compass, start=wanted.start, end=wanted.end)
     require_readings(new)
     problem = best_form([Problem(new, form, in_force, earth) for form in forms])
-    complaints = compass_complaints(recording, compass)
-    if problem.control.kind == CURRENT:
-        complaints += current_complaints(recording)
+    complaints = _complaints(recording, compass, problem.control.kind)
     found, verdict = judge(problem, fit(problem, wanted.method), complaints=complaints)
     return _Judged(problem, found, _in_words_of(recording, verdict))
+
+
+def _complaints(recording: Recording, compass: int, kind: str) -> tuple[str, ...]:
+    """What is wrong with the sensors that an answer by a control quantity rests on."""
+    of_compass = compass_complaints(recording, compass)
+    return of_compass + current_complaints(recording) if kind == CURRENT else of_compass
 
 
 def _in_words_of(recording: Recording, verdict: Verdict) -> Verdict:

@@ -63,6 +63,8 @@ FIRST_VERSION = (1, 12)
 
 _THRUST_CURVE = "THR_MDL_FAC"
 _LOW, _HIGH = 1000.0, 2000.0
+_LEAST_USUAL = {CURRENT: 1.0, THROTTLE: 0.05}
+"""With less in ordinary flight COMP cannot make up for anything."""
 _LOGGED = LagPriors(LagPrior(0.0, 0.05), LagPrior(0.0, 0.1))
 """A log stamps a reading with the moment of measurement."""
 _LINK = LagPriors(LagPrior(0.0, 0.1), LagPrior(0.0, 0.1))
@@ -103,6 +105,7 @@ class Px4:
     compass_prefix = "CAL_MAG"
     device_id_names = tuple(single_name("ID", number) for number in NUMBERS)
     batteries = (0, 1)
+    first_slot_leads = False
     first_compass_message = "SCALED_IMU"
     storage_s = 2.5  # it saves all at once, 0.3 s after a change and not again for 2 s
     device_ids_describe = "bus, address and type of a sensor, which are alike in vehicles of a kind"
@@ -228,8 +231,8 @@ class Px4:
         if not soft_iron_fitted:
             wanted = _with_shape(wanted, present)
         made = noticed(wanted, present, offset_zone(values), rotation)
-        power = usual if regressor == THROTTLE else usual / MGAUSS
-        if power > 0.0:
+        if usual >= _LEAST_USUAL[regressor]:
+            power = usual if regressor == THROTTLE else usual / MGAUSS
             missed = (made.offset - wanted.offset) / power
             made = replace(made, motor=made.motor + missed)
         found = _vector("COMP", compass, made.motor) | _vector("OFF", compass, made.offset)

@@ -28,6 +28,11 @@ from magcomp.model import Compass, ParameterHistory
 
 NUMBERS = tuple(slot + 1 for slot in SLOTS)
 _BY_ANGLES = 100
+_FLATTEST = 0.01
+"""A soft iron that leaves less of a direction cannot be undone."""
+
+_MOST = (1e4, math.inf)
+"""No gauss and no scale is as large; the firmware takes any switch."""
 
 
 def compasses(values: Mapping[str, float]) -> tuple[Compass, ...]:
@@ -68,35 +73,35 @@ def left_out(parameters: ParameterHistory) -> dict[int, InputError]:
             name: change.value
             for name in names
             for change in parameters.of(name)
-            if not math.isfinite(change.value)
+            if not abs(change.value) < _MOST[name == COMPENSATION_SWITCH]  # NaN fails
         }
         if bad:
-            found[number] = _not_finite(bad)
+            found[number] = _not_sound(bad)
         elif number not in slots:
             found[number] = MissingDataError(
                 f"compass {number} must have a calibration slot of its own; instead "
                 f"{single_name('ID', number)} is 0: calibrate the compasses once with the ground "
                 "station and record again"
             )
-        elif np.linalg.eigvalsh(stored(values, number).soft_iron).min() <= 0.0:
+        elif np.linalg.eigvalsh(stored(values, number).soft_iron).min() < _FLATTEST:
             found[number] = ParameterFileError(
                 f"SCALE and ODIAG of CAL_MAG{number - 1} must make a soft iron that can be undone; "
-                "instead theirs turns a direction around: calibrate the compass anew and record "
-                "again"
+                "instead theirs flattens a direction or turns it around: calibrate the compass "
+                "anew and record again"
             )
     return found
 
 
-def _not_finite(values: Mapping[str, float]) -> ParameterFileError:
+def _not_sound(values: Mapping[str, float]) -> ParameterFileError:
     listed = ", ".join(values)
     held = ", ".join(dict.fromkeys(str(value) for value in values.values()))
     ones = [(found := parse(name)) is not None and found.kind is Kind.DIAGONAL for name in values]
     neutral = "1" if all(ones) else "0 (those of SCALE to 1)" if any(ones) else "0"
     many = len(values) > 1
     return ParameterFileError(
-        f"{listed} must be {'finite numbers' if many else 'a finite number'}; instead the log "
-        f"holds {held}: set {'them' if many else 'it'} to {neutral}, restart the vehicle and "
-        "record again"
+        f"{listed} must be {'numbers' if many else 'a number'} that a compass can have; instead "
+        f"the log holds {held}: set {'them' if many else 'it'} to {neutral}, restart the vehicle "
+        "and record again"
     )
 
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from magcomp.fleet.aircraft import Aircraft, Attention
+from magcomp.fleet.aircraft import Aircraft
 from magcomp.fleet.flights import Flight, Selected
+from magcomp.fleet.history import Attention
 
 
 @dataclass(frozen=True, eq=False)

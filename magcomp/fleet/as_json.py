@@ -7,9 +7,10 @@ from datetime import UTC, datetime
 from typing import Any
 
 from magcomp import __version__
-from magcomp.fleet.aircraft import Aircraft, CompassHistory
+from magcomp.fleet.aircraft import Aircraft
 from magcomp.fleet.answer import Fleet
 from magcomp.fleet.flights import Flight
+from magcomp.fleet.history import CompassHistory
 from magcomp.model import UNITS
 
 
@@ -63,7 +64,9 @@ def _compass(history: CompassHistory) -> dict[str, Any]:
             "interference_mgauss": -pooled.motor,
             "std_mgauss": [float(pooled.covariance[i, i]) ** 0.5 for i in range(3)],
             "scatter_mgauss": pooled.scatter,
+            "scatter_deg": history.scatter_deg,
             "flights": pooled.count,
+            "agree": history.agree,
         },
         "apart": [{"log": history.flights[i].path, "why": text} for i, text in history.apart],
         "flights": [_flight(one) for one in history.flights],

@@ -118,8 +118,10 @@ def _at_address(address: str) -> Iterator[Log]:
         raise UsageError(f"{address} must be reachable; instead received: {error}") from error
     if not found:
         raise UsageError(f"{address} must hold logs; instead there is none")
-    for name, info in sorted(found.items()):
-        if info.get("type", "file") == "file":
+    for name, listed in sorted(found.items()):
+        if listed.get("type", "file") == "file":
+            # A web server's list of files tells no more than their names.
+            info = system.info(name) if listed.get("size") is None else listed
             yield _remote(str(system.unstrip_protocol(name)), info)
 
 

@@ -60,7 +60,7 @@ def carry_out(task: Task) -> Outcome:
     """Read, fit and judge one log; whatever is wrong with it becomes a row."""
     log, digest, recording = task.log, "", None
     try:
-        with _local(log) as path:
+        with local_file(log.path) as path:
             digest = digest_of(path)
             if digest in task.known:
                 return Outcome(log, digest, without_fit(log, digest, "", state=State.COPY))
@@ -110,14 +110,20 @@ def _unusable(log: Log, digest: str, why: str, recording: Recording | None) -> t
 
 
 @contextmanager
-def _local(log: Log) -> Iterator[Path]:
-    """The log as a file of this machine."""
-    if not places.is_address(log.path):
-        yield Path(log.path)
+def local_file(place: str) -> Iterator[Path]:
+    """What lies at a place as a file of this machine.
+
+    Raises
+    ------
+    LogError
+        Where it cannot be fetched.
+    """
+    if not places.is_address(place):
+        yield Path(place)
         return
-    with places.fetched(log.path) as path:
+    with places.fetched(place) as path:
         try:
             yield path
         except MagcompError as error:
             # The user knows the address, not where it was put.
-            raise type(error)(str(error).replace(os.fspath(path), log.path)) from error
+            raise type(error)(str(error).replace(os.fspath(path), place)) from error

@@ -12,6 +12,7 @@ from magcomp.model import Coverage, FieldResidual, FloatArray, Lags, MotorFit, S
 _SPHERE_BANDS, _SPHERE_SECTORS = 6, 12
 _HEADING_SECTORS = 24
 _GAP_S = 2.0
+_IDLE_SHARE = 0.05
 _LEAST_FOLDS = 3
 
 
@@ -102,6 +103,7 @@ def cover(samples: Samples, corrected: FloatArray) -> Coverage:
         u_low=float(np.quantile(samples.u, 0.02)),
         u_high=float(np.quantile(samples.u, 0.98)),
         seconds=float(np.sum(steps[steps < _GAP_S])),
+        u_median=float(np.median(samples.u[samples.u >= _IDLE_SHARE * samples.u.max()])),
     )
 
 

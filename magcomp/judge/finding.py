@@ -21,3 +21,8 @@ class Finding:
 
     grade: Grade
     reason: str
+
+
+def severity(grade: Grade) -> int:
+    """0 for good, more for worse."""
+    return (Grade.GOOD, Grade.MARGINAL, Grade.REJECTED).index(grade)

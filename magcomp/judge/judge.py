@@ -11,7 +11,8 @@ import numpy as np
 from magcomp.align import interpolate
 from magcomp.fit import Problem
 from magcomp.judge.evidence import cover, field_residual, used_lags
-from magcomp.judge.finding import Finding
+from magcomp.judge.finding import Finding, severity
+from magcomp.judge.gates import on_control, on_turn, on_unseen_parameters
 from magcomp.judge.heading_error import control_grid, heading_errors
 from magcomp.judge.keep import is_close, keep
 from magcomp.judge.thresholds import Thresholds
@@ -37,10 +38,6 @@ UNSEEN = 1.25
 """Standard errors are widened by this for errors alike in every block and every fold: a current
 sensor's scale that drifts with it, a lag that is not one number, wires that share unequally.
 benchmarks/coverage.py counts how often the bounds hold on simulated vehicles."""
-
-
-_HOVERS = 0.4
-"""A vehicle that stays in the air never lets its motors idle: this share of its highest control."""
 
 FLOOR_MOTOR, FLOOR_OFFSET_MGAUSS, FLOOR_SOFT_IRON = 0.005, 0.3, 0.001
 """What no residual shows: a share of the motor vector for wires that share unequally and current
@@ -97,20 +94,16 @@ def judge(
         *(Finding(Grade.REJECTED, complaint) for complaint in complaints),
         *on_earth(problem, samples, fit),
         *on_constancy(problem, fit, limits),
-        *_on_unseen_parameters(in_force.unseen),
+        *on_unseen_parameters(in_force.unseen),
         *_findings(fit, errors, residual, covered, limits),
     ]
-    grade = max((f.grade for f in findings), key=_severity, default=Grade.GOOD)
+    grade = max((f.grade for f in findings), key=severity, default=Grade.GOOD)
     fit = keep(fit, in_force.correction) if stays else fit
     summary = _summary(fit, errors, residual)
     reasons = tuple(
-        f.reason for f in sorted(findings, key=lambda f: _severity(f.grade), reverse=True)
+        f.reason for f in sorted(findings, key=lambda f: severity(f.grade), reverse=True)
     )
     return fit, Verdict(grade, (*reasons, summary), errors, residual, covered)
-
-
-def _severity(grade: Grade) -> int:
-    return (Grade.GOOD, Grade.MARGINAL, Grade.REJECTED).index(grade)
 
 
 def _widened(fit: MotorFit, motors: FloatArray) -> MotorFit:
@@ -153,46 +146,11 @@ def _findings(
     covered: Coverage,
     limits: Thresholds,
 ) -> Iterator[Finding]:
-    yield from _on_control(fit, errors, covered, limits)
+    known = _worst_flown(fit, errors).p95 <= limits.marginal_deg
+    yield from on_control(fit.regressor, covered, limits, known=known)
     yield from _on_unseen(fit, errors, residual, limits)
     yield from _on_bound(fit, errors, limits)
     yield from _on_shape(fit, errors, residual, covered, limits)
-
-
-def _on_unseen_parameters(unseen: tuple[str, ...]) -> Iterator[Finding]:
-    if unseen:
-        some = ", ".join(unseen[:3]) + (f" and {len(unseen) - 3} more" if len(unseen) > 3 else "")
-        yield Finding(
-            Grade.REJECTED,
-            f"what was in force is unknown, because {some} {'is' if len(unseen) == 1 else 'are'} "
-            "not in the log: let the ground station fetch the whole parameter list while it "
-            "records, or take the log of the autopilot's card",
-        )
-
-
-def _on_control(
-    fit: MotorFit, errors: tuple[HeadingError, ...], covered: Coverage, limits: Thresholds
-) -> Iterator[Finding]:
-    span = covered.u_high - covered.u_low
-    # A hover's narrow range may still do where the motors add little: the bound knows. Where the
-    # motors hardly ran, nothing is known of how they run in the air.
-    hovering = covered.u_low > _HOVERS * covered.u_high
-    known = hovering and _worst_flown(fit, errors).p95 <= limits.marginal_deg
-    grade = Grade.MARGINAL if known else Grade.REJECTED
-    if fit.regressor == CURRENT and span < limits.least_current_a:
-        yield Finding(
-            grade,
-            f"the current only ranged from {covered.u_low:.0f} to {covered.u_high:.0f} A: "
-            "fly climbs and descents so that the motors work harder and less hard",
-        )
-    elif fit.regressor != CURRENT and span < limits.least_throttle:
-        yield Finding(
-            Grade.REJECTED if covered.u_high < 0.3 else grade,
-            f"the throttle never rose above {covered.u_high * 100:.0f} %: fly a climb"
-            if covered.u_high < 0.3
-            else f"the throttle only ranged from {covered.u_low * 100:.0f} to "
-            f"{covered.u_high * 100:.0f} %: fly climbs and descents",
-        )
 
 
 def _on_unseen(
@@ -267,14 +225,9 @@ def _on_shape(
     covered: Coverage,
     limits: Thresholds,
 ) -> Iterator[Finding]:
-    if fit.method == "flight" and covered.heading < limits.heading:
+    if fit.method == "flight":
         known = _worst_flown(fit, errors).p95 <= limits.marginal_deg
-        enough = covered.heading >= limits.least_heading or known
-        yield Finding(
-            Grade.MARGINAL if enough else Grade.REJECTED,
-            f"the vehicle faced only {covered.heading * 100:.0f} % of a full turn: "
-            "turn slowly all the way round",
-        )
+        yield from on_turn(covered, limits, known=known)
     if residual.held_out > limits.noise_share * fit.strength:
         yield Finding(
             Grade.MARGINAL if _fall(residual) > limits.worthwhile else Grade.REJECTED,

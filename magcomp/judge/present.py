@@ -4,9 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from magcomp.fit import Problem, centres_of_flight, departures, is_still, spread
+from magcomp.fit import (
+    Problem,
+    centres_of_flight,
+    departures,
+    is_still,
+    require_readings,
+    spread,
+)
 from magcomp.geometry import body_from_earth
 from magcomp.judge.evidence import cover
+from magcomp.judge.finding import Finding, severity
+from magcomp.judge.gates import on_control, on_duration, on_turn, on_unseen_parameters
 from magcomp.judge.heading_error import attitudes, largest_shift
 from magcomp.judge.thresholds import Thresholds
 from magcomp.model import (
@@ -26,7 +35,9 @@ _BINS = 6
 _TWO_SIDED_95 = 1.96
 
 
-def judge_present(problem: Problem, thresholds: Thresholds | None = None) -> Verdict:
+def judge_present(
+    problem: Problem, thresholds: Thresholds | None = None, complaints: tuple[str, ...] = ()
+) -> Verdict:
     """Judge the calibration in force.
 
     Parameters
@@ -36,6 +47,13 @@ def judge_present(problem: Problem, thresholds: Thresholds | None = None) -> Ver
         where none is in force.
     thresholds
         The limits.
+    complaints
+        What is wrong with the sensors, in words: any of them rejects.
+
+    Raises
+    ------
+    MissingDataError
+        With too few readings.
 
     Notes
     -----
@@ -44,26 +62,52 @@ def judge_present(problem: Problem, thresholds: Thresholds | None = None) -> Ver
     and changes neither strength nor dip cannot be seen this way.
     """
     limits = Thresholds() if thresholds is None else thresholds
+    require_readings(problem.readings)
     samples = problem.sample(problem.usual_lags())
     present = problem.readings.in_force[-1].correction
     middle = np.median(departures(samples.present, samples.down, 0.0, 0.0), axis=0)
     earth = (float(middle[0]), float(middle[1]))
     left = departures(samples.present, samples.down, *earth)
     noise = max(_MAD_TO_STD * float(np.median(np.abs(left))), 0.2)
+    still = is_still(samples)
     levels = (
         _still_levels(samples, present, noise)
-        if is_still(samples)
+        if still
         else centres_of_flight(samples, present, earth, noise, _BINS)
     )
     errors = tuple(_error(level, present, earth) for level in levels)
     unexplained = spread(left)
-    grade, reason = _grade(errors, problem.control.kind, limits)
+    covered = cover(samples, samples.present)
+    found = _measured(errors, problem.control.kind, limits)
+    known = found.grade is Grade.GOOD
+    findings = [
+        found,
+        *(Finding(Grade.REJECTED, complaint) for complaint in complaints),
+        *on_unseen_parameters(problem.readings.in_force[-1].unseen),
+        *on_duration(covered, limits),
+        *on_control(problem.control.kind, covered, limits, known=known),
+        *(_on_stillness() if still else on_turn(covered, limits, known=False)),
+    ]
+    findings.sort(key=lambda finding: severity(finding.grade), reverse=True)
     return Verdict(
-        grade=grade,
-        reasons=(reason, f"{unexplained:.1f} mGauss of {earth[0]:.0f} are unexplained"),
+        grade=findings[0].grade,
+        reasons=(
+            *(finding.reason for finding in findings),
+            f"{unexplained:.1f} mGauss of {earth[0]:.0f} are unexplained",
+        ),
         heading_error=errors,
         residual=FieldResidual(unexplained, unexplained, unexplained, unexplained),
-        coverage=cover(samples, samples.present),
+        coverage=covered,
+    )
+
+
+def _on_stillness() -> tuple[Finding, ...]:
+    return (
+        Finding(
+            Grade.MARGINAL,
+            "a vehicle that stands still shows what its motors add, not whether its calibration "
+            "is right: fly, and turn all the way round",
+        ),
     )
 
 
@@ -112,9 +156,11 @@ def _shift(delta: FloatArray, earth: tuple[float, float]) -> float:
     return largest_shift(field + delta, field, roll, pitch)
 
 
-def _grade(errors: tuple[HeadingError, ...], kind: str, limits: Thresholds) -> tuple[Grade, str]:
+def _measured(errors: tuple[HeadingError, ...], kind: str, limits: Thresholds) -> Finding:
     if not errors:
-        return Grade.REJECTED, "the recording is too short to judge the calibration in force"
+        return Finding(
+            Grade.REJECTED, "the recording is too short to judge the calibration in force"
+        )
     worst = max(errors, key=lambda row: row.before)
     where = f"{worst.u:.0f} A" if kind == CURRENT else f"{worst.u * 100:.0f} % throttle"
     found = (
@@ -122,7 +168,7 @@ def _grade(errors: tuple[HeadingError, ...], kind: str, limits: Thresholds) -> t
         f"{where} (at most {worst.p95:.1f}° with 95 %)"
     )
     if worst.before > limits.marginal_deg:
-        return Grade.REJECTED, found
+        return Finding(Grade.REJECTED, found)
     if worst.before > limits.good_deg or worst.p95 > limits.marginal_deg:
-        return Grade.MARGINAL, found
-    return Grade.GOOD, found
+        return Finding(Grade.MARGINAL, found)
+    return Finding(Grade.GOOD, found)

@@ -34,6 +34,9 @@ class Thresholds:
         Heading error beyond which a plain departure from the model keeps a fit from being good.
     useless_deg
         A bound beyond this is rejected whatever was in force.
+    least_seconds
+        A calibration in force is not judged by less than this; a fit needs three stretches of
+        four seconds, too.
     """
 
     good_deg: float = 2.0
@@ -49,3 +52,4 @@ class Thresholds:
     lesser_evil: float = 1 / 3
     departure_deg: float = 1.0
     useless_deg: float = 20.0
+    least_seconds: float = 12.0

@@ -17,7 +17,7 @@ from magcomp.link.address import (
     parse_address,
 )
 from magcomp.link.clock import Clock, SystemClock
-from magcomp.link.diagnosis import why_no_vehicle
+from magcomp.link.diagnosis import why_ambiguous, why_no_vehicle
 from magcomp.link.events import LinkEvent
 from magcomp.link.framing import GROUND_STATION_SYSTEM, Message
 from magcomp.link.opening import open_transport
@@ -140,19 +140,11 @@ class Connection:
         with self._changed:
             self._changed.wait_for(self._vehicle_clear, timeout)
             self._raise_failure()
-            if self._state.has_twin and self._state.ambiguous():
-                raise LinkError(
-                    f"One vehicle of a number must be on {self.address}; instead two at different "
-                    f"addresses say that they are system {self._state.heartbeats[0].system}. "
-                    "Give one of them another number, or switch it off."
-                )
             if self._state.ambiguous():
-                systems = " and ".join(
-                    f"{h.system} ({h.autopilot} {h.kind})" for h in self._state.heartbeats
-                )
                 raise LinkError(
-                    f"Several vehicles are on {self.address}, systems {systems}; "
-                    "choose one with --system."
+                    why_ambiguous(
+                        str(self.address), self._state.heartbeats, twins=self._state.has_twin
+                    )
                 )
             vehicle = self._state.vehicle
             if vehicle is None:

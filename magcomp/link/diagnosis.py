@@ -1,4 +1,4 @@
-"""Why no vehicle was found, in one sentence, from what arrived instead."""
+"""Why no vehicle was found, or too many, in one sentence, from what arrived instead."""
 
 from __future__ import annotations
 
@@ -64,3 +64,25 @@ def why_no_vehicle(
         f"{statistics.frames} frames arrived, but none from an {autopilots.TITLES} autopilot "
         f"(only {', '.join(names)})."
     )
+
+
+def why_ambiguous(address: str, heartbeats: Sequence[Identity], *, twins: bool) -> str:
+    """Explain why nobody can tell which vehicle is meant.
+
+    Parameters
+    ----------
+    address
+        Where they were heard.
+    heartbeats
+        The autopilots.
+    twins
+        Two of one number speak, from different addresses.
+    """
+    if twins:
+        return (
+            f"One vehicle of a number must be on {address}; instead two at different addresses say "
+            f"that they are system {heartbeats[0].system}. Give one of them another number or "
+            "switch it off; where both are one vehicle, --system takes the one heard first."
+        )
+    systems = " and ".join(f"{h.system} ({h.autopilot} {h.kind})" for h in heartbeats)
+    return f"Several vehicles are on {address}, systems {systems}; choose one with --system."

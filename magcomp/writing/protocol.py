@@ -82,23 +82,18 @@ from magcomp.writing.messages import (
     SetValue,
 )
 from magcomp.writing.plan import WritePlan
+from magcomp.writing.stages import (
+    CLOSED,
+    FENCED,
+    NEXT,
+    PINGING,
+    REPEATED,
+    WRITING,
+    Target,
+    expected,
+)
 from magcomp.writing.watch import VehicleWatch
 
-_NEXT = {
-    Stage.COMPARE: Stage.OFF,
-    Stage.OFF: Stage.WRITE,
-    Stage.WRITE: Stage.VERIFY,
-    Stage.VERIFY: Stage.ON,
-    Stage.ON: Stage.CONFIRM,
-    Stage.CONFIRM: Stage.OVER,
-    Stage.SETTLE: Stage.IDENTIFY,
-    Stage.IDENTIFY: Stage.OFF,
-}
-_WRITING = frozenset({Stage.OFF, Stage.WRITE, Stage.ON})
-_REPEATED = frozenset({Stage.OFF, Stage.WRITE})
-_FENCED = frozenset({Stage.SETTLE, Stage.VERIFY, Stage.CONFIRM})
-_PINGING = _FENCED | {Stage.COMPARE}  # in COMPARE, to learn whether and how fast it answers
-_CLOSED = frozenset({Stage.VERIFY, Stage.CONFIRM})  # with a second fence behind their answers
 _OWN_NUMBER = "AUTOPILOT_VERSION"
 _BELIEVED_READS = 2
 _BELIEVED_ECHOES = 12  # at 30 % loss a good write is lost that often once in 10⁶
@@ -187,7 +182,7 @@ class WriteSequence:
             self._doubtful = True
             self._enter(Stage.OFF, now)
         outgoing = [] if self.finished else self._ask(now)
-        if self.stage in _PINGING:
+        if self.stage in PINGING:
             outgoing += self._fence.ask(now)
         events, self._events = self._events, []
         return events, outgoing
@@ -195,7 +190,7 @@ class WriteSequence:
     def wake(self, now: float) -> float:
         """When to poll next, if nothing arrives before."""
         is_open, closed = bool(self._exchange.open), self._gate_closed(now)
-        if self.stage in _FENCED and (closed or not is_open):
+        if self.stage in FENCED and (closed or not is_open):
             due = max(self._not_before, self._fence.wake(now))
         elif not is_open:
             due = self._leaves_at
@@ -229,7 +224,7 @@ class WriteSequence:
             return
         self._types[name] = message.type
         self._fence.answered(now - self._first_asked.pop(name, now))
-        if self.stage in _WRITING:
+        if self.stage in WRITING:
             self._events.append(Written(name, wanted))
             self._not_before = max(self._not_before, now + self._timing.storing)
         if self.stage is Stage.WRITE:
@@ -258,7 +253,7 @@ class WriteSequence:
         count = self._exchange.differ(name)
         if count == 0:
             return
-        if self.stage not in _WRITING:
+        if self.stage not in WRITING:
             if count >= _BELIEVED_READS:
                 self._believe(name, value, now)
             return
@@ -284,7 +279,7 @@ class WriteSequence:
             self._end(Reason.ANOTHER_VEHICLE, why)
         elif self.stage is Stage.COMPARE:
             self._end(Reason.CHANGED, f"{why} (it changed since the backup)")
-        elif self.stage in _WRITING:
+        elif self.stage in WRITING:
             self._fail(Reason.MISMATCH, why, now)
         else:
             self._restart(Reason.MISMATCH, why, now)
@@ -299,33 +294,22 @@ class WriteSequence:
         elif self._watch.is_overdue(now):
             self._fail(Reason.TIMEOUT, f"the write did not end within {limit:.0f} s", now)
         elif (
-            self.stage in _WRITING
+            self.stage in WRITING
             and self._gate_closed(now)
             and self._watch.is_without_heartbeat(now)
         ):
             self._fail(Reason.LINK_LOST, f"no heartbeat came for {silence:.0f} s", now)
-        elif self.stage in _FENCED and self._fence.exhausted():
+        elif self.stage in FENCED and self._fence.exhausted():
             self._fail(Reason.TIMEOUT, "the vehicle answers no TIMESYNC any more", now)
         elif silent:
-            verb = "confirmed" if self.stage in _WRITING else "answered"
+            verb = "confirmed" if self.stage in WRITING else "answered"
             why = f"{silent[0]} was not {verb} in {self._timing.attempts} attempts"
             self._fail(Reason.TIMEOUT, why, now)
 
     def _enter(self, stage: Stage, now: float) -> None:
-        off = dict.fromkeys(self._switches, 0.0)
-        on = {name: value for name, value in self._switches.items() if value != 0.0}
-        used = [n for n, v in self._plan.switches.items() if v != 0.0 or self._plan.old[n] != 0.0]
-        expected: dict[Stage, Mapping[str, float]] = {
-            Stage.COMPARE: {**self._plan.identity, **self._plan.old},
-            Stage.IDENTIFY: self._plan.identity,
-            Stage.OFF: dict.fromkeys(used, 0.0),
-            Stage.WRITE: dict(self._unconfirmed),
-            Stage.VERIFY: {**off, **self._values},
-            Stage.ON: on,
-            Stage.CONFIRM: {**self._switches, **({} if on else self._values)},
-        }
+        target = Target(self._values, self._switches, self._unconfirmed)
         self.stage = stage
-        self._expected = expected.get(stage, {})
+        self._expected = expected(stage, self._plan, target)
         asked = [*self._expected]
         if self._plan.vehicle.uid and stage in {Stage.COMPARE, Stage.IDENTIFY}:
             asked.append(_OWN_NUMBER)
@@ -336,9 +320,9 @@ class WriteSequence:
             self._begin_values()
             self._doubtful = True
             self._not_before = now + self._fence.quiet
-        if stage in _FENCED:
+        if stage in FENCED:
             self._fence.up(now)
-        if stage in _WRITING and self._expected:
+        if stage in WRITING and self._expected:
             self._events.append(Intends(stage, dict(self._expected)))
 
     def _begin_values(self) -> None:
@@ -354,10 +338,10 @@ class WriteSequence:
     def _is_complete(self, now: float) -> bool:
         if self._exchange.open or now < self._leaves_at:
             return False
-        if self.stage in _CLOSED and not self._closing:
+        if self.stage in CLOSED and not self._closing:
             self._closing = True
             self._fence.up(now)
-        return self.stage not in _FENCED or self._fence.passed(now, doubtful=self._doubtful)
+        return self.stage not in FENCED or self._fence.passed(now, doubtful=self._doubtful)
 
     def _leave(self, now: float) -> None:
         if self.stage is Stage.COMPARE and not self._all_fit():
@@ -365,10 +349,10 @@ class WriteSequence:
         if self.stage is Stage.CONFIRM:
             self._complete()
             return
-        if self.stage in _FENCED:
+        if self.stage in FENCED:
             self._doubtful = False
-        self._switched_off = self.stage in _REPEATED
-        self._enter(_NEXT[self.stage], now)
+        self._switched_off = self.stage in REPEATED
+        self._enter(NEXT[self.stage], now)
 
     def _all_fit(self) -> bool:
         for name, value in {**self._values, **self._switches}.items():
@@ -390,20 +374,20 @@ class WriteSequence:
             self._first_asked.setdefault(name, now)
             if again and self.stage is Stage.OFF:
                 self._late_off = now + self._fence.quiet
-            if self.stage in _REPEATED or (self.stage is Stage.ON and not again):
+            if self.stage in REPEATED or (self.stage is Stage.ON and not again):
                 self._touched = True
                 kind = self._types.get(name, REAL32)
                 outgoing.append(SetValue(name, self._expected[name], kind))
-            if self.stage not in _WRITING or again:
+            if self.stage not in WRITING or again:
                 outgoing.append(ReadName(name))
         return outgoing
 
     def _gate_closed(self, now: float) -> bool:
         """Whether a write waits for a heartbeat that says disarmed, or a read for its fence."""
-        if self.stage in _CLOSED and not self._closing:
+        if self.stage in CLOSED and not self._closing:
             passed = self._fence.passed(now, doubtful=self._doubtful)
             return now < self._not_before or not passed
-        return self.stage in _WRITING and not self._watch.is_known_disarmed(now)
+        return self.stage in WRITING and not self._watch.is_known_disarmed(now)
 
     def _restart(self, reason: Reason, why: str, now: float) -> None:
         self._restarts += 1

@@ -356,7 +356,11 @@ def test_a_recording_without_parameters_is_refused_with_what_to_give() -> None:
         PX4.require_fittable(recording("", ParameterHistory()))
 
 
-@given(numbers, st.sampled_from([math.nan, math.inf]), st.sampled_from(["COMP", "OFF", "SCALE"]))
+@given(
+    numbers,
+    st.sampled_from([math.nan, math.inf, 3e38, -1e9]),
+    st.sampled_from(["COMP", "OFF", "SCALE"]),
+)
 def test_a_value_that_is_none_leaves_out_its_own_compass_alone(number, value, kind):
     bad = vector_names(kind, number)[1]
     values = {**held(1), **held(2), **held(3), **held(4), bad: value}
@@ -367,11 +371,11 @@ def test_a_value_that_is_none_leaves_out_its_own_compass_alone(number, value, ki
 
 
 def test_a_compass_without_a_slot_and_one_turned_inside_out_are_left_out():
-    values = {**held(1), **held(2, ODIAG=(1.5, 0.0, 0.0))}
+    values = {**held(1), **held(2, ODIAG=(1.5, 0.0, 0.0)), **held(3, SCALE=(1e-30, 1.0, 1.0))}
     found = PX4.left_out(history((0.0, values)))
     assert set(found) == {2, 3, 4}
-    assert "CAL_MAG2_ID is 0" in str(found[3])
-    assert "CAL_MAG1" in str(found[2])
+    assert "CAL_MAG3_ID is 0" in str(found[4])
+    assert all(f"CAL_MAG{n - 1}" in str(found[n]) for n in (2, 3))
 
 
 def test_what_a_log_does_not_tell_is_named():

@@ -32,3 +32,9 @@ def hold(megabytes: int) -> int:
 
 def whose(_: int) -> int:
     return os.getpid()
+
+
+def fail_of_three(number: int) -> int:
+    if number == 3:
+        raise ValueError("three")
+    return 2 * number

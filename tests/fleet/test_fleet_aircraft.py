@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from made_flights import DAY, FIRST, MOTOR, fleet, log_of, row, selected
 
-from magcomp.fleet.aircraft import Attention, Holds, aircraft
+from magcomp.fleet.aircraft import aircraft
 from magcomp.fleet.as_json import fleet_object
 from magcomp.fleet.as_text import fleet_text
 from magcomp.fleet.flights import select
+from magcomp.fleet.history import Attention, Holds
 from magcomp.fleet.row import Row, State, without_fit
 from magcomp.fleet.run import Known, key
 from magcomp.fleet.store import table_of
@@ -55,6 +56,15 @@ def test_a_log_without_board_goes_with_none_of_two() -> None:
 def test_logs_of_nobody_are_not_put_together() -> None:
     rows = [row(k, uid="", device_ids="") for k in range(3)]
     assert [each.known_by for each in aircraft(selected(rows))] == ["log"] * 3
+
+
+def test_flights_of_which_each_says_something_else_have_no_common_answer() -> None:
+    rng = np.random.default_rng(1)
+    (found,) = aircraft(selected([row(k, MOTOR + rng.normal(size=3)) for k in range(6)]))
+    assert not found.compasses[0].agree
+    assert any("no common answer" in each.text for each in found.findings)
+    assert all(each.compasses[0].agree for each in aircraft(selected(scattered(6))))
+    assert not aircraft(selected(scattered(1)))[0].compasses[0].agree
 
 
 def test_a_flight_apart_is_named_with_what_differs_and_left_out() -> None:

@@ -11,6 +11,7 @@ from synthetic import EXACT, Flown, Swept, Turned, earth, problem_of, waves
 
 from magcomp.analysis import Options, analyse
 from magcomp.autopilots import ardupilot
+from magcomp.errors import MissingDataError
 from magcomp.fit import fit, folds
 from magcomp.geometry import body_from_earth, heading, wrap_angle
 from magcomp.judge import evidence, heading_errors, judge, judge_present, largest_shift
@@ -285,6 +286,38 @@ def test_an_exact_calibration_in_force_is_good():
     in_force = {"COMPASS_MOTCT": 2.0, **ardupilot.correction_parameters(EXACT, 1, 1.0)}
     verdict = judge_present(Flown(seed=1, in_force=in_force).problem())
     assert verdict.grade is Grade.GOOD
+
+
+CALIBRATED = {"COMPASS_MOTCT": 2.0, **ardupilot.correction_parameters(EXACT, 1, 1.0)}
+
+
+def test_motors_that_are_off_prove_nothing_about_the_calibration_in_force():
+    flown = Flown(seed=1, in_force=CALIBRATED).recording()
+    idle = Series(flown.current.time, 0.3 + 1e-3 * np.sin(flown.current.time))
+    verdict = judge_present(problem_of(replace(flown, current=idle, throttle=None, outputs=None)))
+    assert verdict.grade is Grade.REJECTED
+    assert any("the current only ranged from 0 to 0 A" in reason for reason in verdict.reasons)
+
+
+@pytest.mark.parametrize(
+    ("complaints", "end", "told"),
+    [
+        (("compass 1 is frozen",), np.inf, "compass 1 is frozen"),
+        ((), 9.0, "too short to judge anything by"),
+    ],
+)
+def test_what_a_fit_is_refused_for_the_calibration_in_force_is_not_good_by(complaints, end, told):
+    problem = problem_of(Flown(seed=1, in_force=CALIBRATED).recording())
+    short = problem.where(problem.readings.time < end)
+    verdict = judge_present(short, complaints=complaints)
+    assert verdict.grade is Grade.REJECTED
+    assert told in said(verdict)
+
+
+def test_a_calibration_in_force_needs_readings_to_be_judged():
+    problem = problem_of(Flown(seed=1).recording())
+    with pytest.raises(MissingDataError, match="at least 60 new readings; instead it has 30"):
+        judge_present(problem.where(np.arange(len(problem.readings)) < 30))
 
 
 def test_motors_that_nobody_compensates_are_told_in_degrees_and_amperes():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -155,29 +155,39 @@ def _vehicle(who: Identity, values: Mapping[str, float]) -> Vehicle:
 def _applied(readings: Mapping[int, Readings], parameters: ParameterHistory) -> dict[int, Applied]:
     """What the log says was applied, with the fractions that its whole numbers lack."""
     found = {}
+    moments = (-np.inf, *autopilots.named(_AUTOPILOT).changes(parameters))[:_LEAST_LIST]
     for number, each in readings.items():
         if each.offset is None or each.motor is None:
             continue
         if not (np.isfinite(each.offset).all() and np.isfinite(each.motor).all()):
             continue
         time = each.field.time
-        offset = _with_fractions(each, number, parameters)
+        offset = _with_fractions(each.offset, time, _offsets(parameters, number, moments))
         motor = each.motor + 0.5 * np.sign(each.motor)
         found[number] = Applied(Series(time, offset), Series(time, motor))
     return found
 
 
-def _with_fractions(each: Readings, number: int, parameters: ParameterHistory) -> FloatArray:
-    """Offsets of each reading: a parameter's where the log has it cut to whole mGauss."""
-    whole = each.offset if each.offset is not None else np.zeros_like(each.field.value)
-    exact = whole + 0.5 * np.sign(whole)
+def _offsets(
+    parameters: ParameterHistory, number: int, moments: Sequence[float]
+) -> Iterator[tuple[float, FloatArray]]:
+    """Offsets of a compass by its parameters, and when each came into force."""
     autopilot = autopilots.named(_AUTOPILOT)
-    moments = [-np.inf, *autopilot.changes(parameters)]
-    for moment in moments[:_LEAST_LIST]:
+    for moment in moments:
         try:
-            offset = autopilot.in_force_at(parameters, number, moment).correction.offset
+            in_force = autopilot.in_force_at(parameters, number, moment)
         except MagcompError:
             continue
-        since = each.field.time[:, np.newaxis] >= moment
-        exact = np.where(since & (np.trunc(offset) == whole), offset, exact)
+        yield moment, in_force.correction.offset
+
+
+def _with_fractions(
+    whole: FloatArray, time: FloatArray, told: Iterable[tuple[float, FloatArray]]
+) -> FloatArray:
+    """Offsets of each reading: a parameter's where the log has it cut to whole mGauss."""
+    exact = whole + 0.5 * np.sign(whole)
+    for moment, offset in told:
+        first = int(np.searchsorted(time, moment))
+        rows = exact[first:]
+        np.copyto(rows, offset, where=np.trunc(offset) == whole[first:])
     return exact

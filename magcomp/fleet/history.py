@@ -1,0 +1,300 @@
+"""One compass over all its flights: what they say together, and whether it still holds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+
+from magcomp.fleet.flights import Flight
+from magcomp.fleet.pooled import SURE, Pooled, chances_apart, change, pool
+from magcomp.judge.thresholds import Thresholds
+from magcomp.model import UNITS, Grade
+from magcomp.model.recording import FloatArray, IntArray
+
+_COVARIANCE = np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2]])
+_MOTOR, _SETTINGS = slice(0, 3), slice(3, 12)
+_ALIKE = 1e-3
+_TILT = math.sin(math.radians(20.0))
+
+
+class Attention(IntEnum):
+    """How soon somebody should look."""
+
+    NONE = 0
+    LOOK = 1
+    ACT = 2
+
+
+class Holds(IntEnum):
+    """Whether the calibration in force is still right, going by the newest flight."""
+
+    UNKNOWN = 0
+    YES = 1
+    BARELY = 2
+    NO = 3
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What somebody should know of an aircraft.
+
+    Attributes
+    ----------
+    attention
+        How soon.
+    text
+        A clause, for people.
+    """
+
+    attention: Attention
+    text: str
+
+
+@dataclass(frozen=True, eq=False)
+class CompassHistory:
+    """One compass of one aircraft over all its flights.
+
+    Attributes
+    ----------
+    compass, device_id
+        Slot, and the id of what stands in it; 0 where unknown.
+    flights
+        In order of time.
+    regressor
+        Control quantity of the flights that are compared.
+    pooled
+        What the flights that agree say together; None where there are none.
+    agreeing
+        Their indices in ``flights``.
+    apart
+        Index of a flight that disagrees to what is known of why.
+    drift_deg
+        Heading shift, at the largest control quantity, of what changed with time; 0 where nothing
+        did.
+    holds
+        Whether the calibration in force still holds.
+    scatter_deg
+        Heading shift of the scatter from flight to flight at the largest control quantity.
+    agree
+        Whether several flights agree well enough for their mean to stand for all.
+    """
+
+    compass: int
+    device_id: int
+    flights: tuple[Flight, ...]
+    regressor: str
+    pooled: Pooled | None
+    agreeing: tuple[int, ...]
+    apart: tuple[tuple[int, str], ...]
+    drift_deg: float
+    holds: Holds
+    findings: tuple[Finding, ...]
+    scatter_deg: float = 0.0
+    agree: bool = False
+
+
+def history(
+    slot: int, device_id: int, flights: Sequence[Flight], limits: Thresholds
+) -> CompassHistory:
+    """One compass over time.
+
+    Parameters
+    ----------
+    slot, device_id
+        Of the compass.
+    flights
+        Its flights in order of time, at least one.
+    limits
+        Of the judge.
+    """
+    newest = flights[-1]
+    holds = holds_in(newest, limits)
+    findings = list(_of_newest(slot, newest, holds, limits))
+    usable = [i for i, each in enumerate(flights) if _comparable(each, newest)]
+    if not usable:
+        return CompassHistory(
+            slot, device_id, tuple(flights), newest.regressor, None, (), (), 0.0, holds,
+            tuple(findings),
+        )  # fmt: skip
+    motors = np.array([flights[i].correction[_MOTOR] for i in usable])
+    covariances = np.array([flights[i].motor_covariance[_COVARIANCE] for i in usable])
+    at = max(flights[i].u_high for i in usable)
+    shift = _shift(newest, at)
+    agreeing: IntArray = np.arange(len(usable))
+    drift = 0.0
+    apart: list[tuple[int, float]] = []
+    pooled = pool(motors, covariances)
+    if float(shift(motors - pooled.motor).max()) > limits.departure_deg / 2:
+        times = np.array([flights[i].when for i in usable])
+        changed = change(times, motors, covariances)
+        if changed is not None and float(shift(changed.difference)) > limits.departure_deg:
+            drift = float(shift(changed.difference))
+            agreeing = agreeing[changed.first :]
+            when = flights[usable[changed.first]].when
+            findings.append(_changed(slot, changed.kind, when, drift, at, newest.regressor))
+        agreeing, apart = _agree(agreeing, motors, covariances, shift, limits.departure_deg)
+        pooled = pool(motors[agreeing], covariances[agreeing])
+    scatter_deg = float(shift(np.full(3, pooled.scatter)))
+    agree = len(agreeing) > 1 and scatter_deg <= limits.departure_deg
+    if scatter_deg > limits.departure_deg:
+        findings.append(_scattering(slot, len(agreeing), scatter_deg, at, newest.regressor))
+    named = tuple(
+        (usable[k], why(flights[usable[k]], [flights[usable[j]] for j in agreeing], float(deg)))
+        for k, deg in apart
+    )
+    if named:
+        of = len(agreeing) + len(named)
+        listed = "; ".join(f"{flights[i].path} ({text})" for i, text in named[:3])
+        more = f"; and {len(named) - 3} more" if len(named) > 3 else ""
+        findings.append(
+            Finding(
+                Attention.LOOK,
+                f"compass {slot}: {len(named)} of {of} flights disagree with the others: "
+                f"{listed}{more}",
+            )
+        )
+    return CompassHistory(
+        slot,
+        device_id,
+        tuple(flights),
+        newest.regressor,
+        pooled,
+        tuple(usable[k] for k in agreeing),
+        named,
+        drift,
+        holds,
+        tuple(findings),
+        scatter_deg,
+        agree,
+    )
+
+
+def _scattering(slot: int, count: int, degrees: float, at: float, regressor: str) -> Finding:
+    return Finding(
+        Attention.LOOK,
+        f"compass {slot}: what the motors add differs between {count} flights by about "
+        f"{degrees:.1f}° of heading at {quantity(at, regressor)}: they have no common answer",
+    )
+
+
+def _comparable(flight: Flight, newest: Flight) -> bool:
+    """Whether a fit is believed, and was made against what the newest was made against."""
+    return (
+        flight.verdict != Grade.REJECTED
+        and flight.regressor == newest.regressor
+        and bool(np.isfinite(flight.correction[_MOTOR]).all())
+        and bool(np.isfinite(flight.motor_covariance).all())
+        and bool(np.linalg.eigvalsh(flight.motor_covariance[_COVARIANCE])[0] > 0.0)
+    )
+
+
+def _agree(
+    among: IntArray,
+    motors: FloatArray,
+    covariances: FloatArray,
+    shift: Callable[[FloatArray], FloatArray],
+    departure_deg: float,
+) -> tuple[IntArray, list[tuple[int, float]]]:
+    """Leave out the flight that is furthest from the others until all agree.
+
+    Of two that disagree nobody knows which is wrong, so both stay, with a scatter between them.
+    Nor is more than a third left out: then the scatter is the truth.
+    """
+    apart: list[tuple[int, float]] = []
+    spare = len(among) // 3
+    while len(among) > 2 and len(apart) < spare:
+        chance, away = chances_apart(motors[among], covariances[among])
+        degrees = shift(away)
+        chance = np.where(degrees > departure_deg, chance * len(among), 1.0)
+        worst = int(np.argmin(chance))
+        if chance[worst] >= SURE:
+            break
+        apart.append((int(among[worst]), float(degrees[worst])))
+        among = np.delete(among, worst)
+    return among, apart
+
+
+def _shift(flight: Flight, at: float) -> Callable[[FloatArray], FloatArray]:
+    """Heading shift in degrees, level or tilted by 20°, of a difference of motor vectors."""
+    horizontal = math.sqrt(max(flight.strength**2 - flight.vertical**2, 1.0))
+
+    def degrees(difference: FloatArray) -> FloatArray:
+        level = np.hypot(difference[..., 0], difference[..., 1])
+        sine = (level + _TILT * np.abs(difference[..., 2])) * at / horizontal
+        # A disturbance as strong as the field itself can point the heading anywhere.
+        return np.where(sine < 1.0, np.degrees(np.arcsin(np.minimum(sine, 1.0))), 180.0)
+
+    return degrees
+
+
+def holds_in(flight: Flight, limits: Thresholds) -> Holds:
+    """Whether the calibration that was in force on a flight was right."""
+    if flight.verdict == Grade.REJECTED or not math.isfinite(flight.before_deg):
+        return Holds.UNKNOWN
+    if flight.before_deg <= limits.good_deg:
+        return Holds.YES
+    return Holds.BARELY if flight.before_deg <= limits.marginal_deg else Holds.NO
+
+
+def _of_newest(slot: int, newest: Flight, holds: Holds, limits: Thresholds) -> Iterator[Finding]:
+    at = quantity(newest.u_high, newest.regressor)
+    if holds is Holds.NO or holds is Holds.BARELY:
+        yield Finding(
+            Attention.ACT if holds is Holds.NO else Attention.LOOK,
+            f"compass {slot}: the calibration in force does not hold: on {date(newest.when)} the "
+            f"heading was wrong by up to {newest.before_deg:.1f}° at {at} (limit "
+            f"{limits.good_deg:g}°)",
+        )
+    elif newest.verdict == Grade.REJECTED:
+        first = newest.reasons.partition("\n")[0]
+        yield Finding(
+            Attention.LOOK,
+            f"compass {slot}: its newest flight, {date(newest.when)}, gives no answer: {first}",
+        )
+
+
+def _changed(
+    slot: int, kind: str, when: float, degrees: float, at: float, regressor: str
+) -> Finding:
+    where = f"{degrees:.1f}° of heading at {quantity(at, regressor)}"
+    if kind == "step":
+        text = f"what the motors add changed on {date(when)} by {where}: was something moved?"
+    else:
+        text = f"what the motors add has drifted since {date(when)} by {where}"
+    return Finding(Attention.ACT, f"compass {slot}: {text}")
+
+
+def why(flight: Flight, others: Sequence[Flight], degrees: float) -> str:
+    """What is different about a flight that disagrees with others, as far as the rows tell."""
+    newest = others[-1]
+    found = [f"{degrees:.1f}° apart"]
+    if flight.verdict == Grade.MARGINAL:
+        found.append(f"marginal: {flight.reasons.partition(chr(10))[0]}")
+    if flight.firmware != newest.firmware:
+        found.append(f"firmware {flight.firmware or 'unknown'}")
+    settings = flight.in_force[_SETTINGS] - newest.in_force[_SETTINGS]
+    if bool((np.abs(settings) > _ALIKE).any()):
+        found.append("another compass calibration was in force")
+    if flight.u_high < min(each.u_high for each in others):
+        found.append(f"only up to {quantity(flight.u_high, flight.regressor)}")
+    if len(found) == 1:
+        found.append("nothing in the log tells why")
+    return ", ".join(found)
+
+
+def quantity(u: float, regressor: str) -> str:
+    """A control quantity for people."""
+    unit = UNITS.get(regressor, "")
+    return f"{u:.0f} {unit}" if unit else f"{100 * u:.0f} % throttle"
+
+
+def date(unix_s: float) -> str:
+    """A day, UTC; a question mark where it is unknown or none."""
+    if not math.isfinite(unix_s):
+        return "?"
+    days = np.datetime64(int(unix_s), "s") if abs(unix_s) < 1e11 else None
+    return "?" if days is None else str(days)[:10]
