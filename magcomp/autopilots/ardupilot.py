@@ -113,6 +113,7 @@ class ArduPilot:
     compass_prefix = "COMPASS_"
     device_id_names = tuple(single_name("DEV_ID", compass) for compass in NUMBERS)
     batteries = (0,)
+    first_slot_leads = True
     first_compass_message = "RAW_IMU"
     storage_s = 1.0  # a queue of writes, each soon, and the memory's lines after it
     device_ids_describe = "bus, address and type of a sensor, which are alike in vehicles of a kind"

@@ -197,6 +197,11 @@ class Autopilot(Protocol):
         ...
 
     @property
+    def first_slot_leads(self) -> bool:
+        """Whether the heading comes from the compass of the first slot that is used."""
+        ...
+
+    @property
     def batteries(self) -> tuple[int, ...]:
         """Battery instances whose current the firmware can multiply."""
         ...

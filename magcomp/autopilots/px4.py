@@ -105,6 +105,7 @@ class Px4:
     compass_prefix = "CAL_MAG"
     device_id_names = tuple(single_name("ID", number) for number in NUMBERS)
     batteries = (0, 1)
+    first_slot_leads = False
     first_compass_message = "SCALED_IMU"
     storage_s = 2.5  # it saves all at once, 0.3 s after a change and not again for 2 s
     device_ids_describe = "bus, address and type of a sensor, which are alike in vehicles of a kind"

@@ -12,6 +12,7 @@ from magcomp.model import Coverage, FieldResidual, FloatArray, Lags, MotorFit, S
 _SPHERE_BANDS, _SPHERE_SECTORS = 6, 12
 _HEADING_SECTORS = 24
 _GAP_S = 2.0
+_IDLE_SHARE = 0.05
 _LEAST_FOLDS = 3
 
 
@@ -102,6 +103,7 @@ def cover(samples: Samples, corrected: FloatArray) -> Coverage:
         u_low=float(np.quantile(samples.u, 0.02)),
         u_high=float(np.quantile(samples.u, 0.98)),
         seconds=float(np.sum(steps[steps < _GAP_S])),
+        u_median=float(np.median(samples.u[samples.u >= _IDLE_SHARE * samples.u.max()])),
     )
 
 
@@ -113,7 +115,7 @@ def _field_heading(corrected: FloatArray, samples: Samples) -> FloatArray:
 
 def _sphere_share(corrected: FloatArray) -> float:
     """Share of equal-area cells of the sphere that the field's direction visited."""
-    unit = corrected / np.linalg.norm(corrected, axis=1, keepdims=True)
+    unit = corrected / np.maximum(np.linalg.norm(corrected, axis=1, keepdims=True), 1e-9)
     band = np.floor((unit[:, 2] + 1) / 2 * _SPHERE_BANDS).clip(0, _SPHERE_BANDS - 1)
     angle = np.arctan2(unit[:, 1], unit[:, 0]) + np.pi
     sector = np.floor(angle / (2 * np.pi) * _SPHERE_SECTORS).clip(0, _SPHERE_SECTORS - 1)

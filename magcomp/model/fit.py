@@ -226,6 +226,9 @@ class Coverage:
         Range of the control quantity.
     seconds
         Time with readings in use.
+    u_median
+        Control quantity in use half of the time the motors worked: the hover of a flight. NaN
+        where unknown.
     """
 
     sphere: float
@@ -234,6 +237,7 @@ class Coverage:
     u_low: float
     u_high: float
     seconds: float
+    u_median: float = np.nan
 
 
 @dataclass(frozen=True)

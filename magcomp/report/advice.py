@@ -1,23 +1,18 @@
-"""What the verdict means for the pilot: a headline and the next steps, from the JSON form."""
+"""What to do next, step by step, from the JSON form."""
 
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from typing import Any
 
 from magcomp import autopilots
 from magcomp.analysis import Options
-from magcomp.report import words
+from magcomp.report import plain, words
+from magcomp.report.roles import roles
 
 GRADES = ("good", "marginal", "rejected")
-
-_ALONE = {
-    "good": "Good: these parameters are worth writing.",
-    "marginal": "Marginal: usable, with a doubt named below.",
-    "rejected": "Rejected: do not write these parameters.",
-}
 
 Document = Mapping[str, Any]
 
@@ -29,17 +24,6 @@ def by_grade(document: Document) -> dict[str, list[int]]:
         for grade in GRADES
     }
     return {grade: numbers for grade, numbers in found.items() if numbers}
-
-
-def headline(document: Document) -> str:
-    """The verdict in one sentence."""
-    grades = by_grade(document)
-    if document["only_to_look_at"]:
-        return "To look at: the firmware cannot multiply what was fitted against."
-    if len(grades) == 1:
-        return _ALONE[next(iter(grades))]
-    parts = [f"{grade} for {words.compasses(numbers)}" for grade, numbers in grades.items()]
-    return words.sentence(", ".join(parts))
 
 
 def steps(document: Document, options: Options | None = None) -> tuple[str, ...]:
@@ -61,8 +45,14 @@ def steps(document: Document, options: Options | None = None) -> tuple[str, ...]
             *(_doubt(c, "") for c in document["compasses"]),
             "Mend what the verdict names, record again, and make a new report of the new log.",
         )
+    if plain.WRITE not in map(plain.answer_of, document["compasses"]):
+        return (
+            "Leave the calibration as it is: this log shows nothing better.",
+            *_each(document),
+            *(_doubt(c, "") for c in document["compasses"] if c["verdict"] == "rejected"),
+        )
     switch = autopilots.named(document["vehicle"]["autopilot"]).switch
-    found = [_write(document, sorted(kept), options)]
+    found = [_write(document, sorted(kept), options), *_each(document)]
     for compass in document["compasses"]:
         if compass["verdict"] == "marginal":
             found.append(_doubt(compass, "Until a better log says otherwise, fly with care"))
@@ -73,6 +63,15 @@ def steps(document: Document, options: Options | None = None) -> tuple[str, ...]
         "finds should be what this report promises."
     )
     return tuple(found)
+
+
+def _each(document: Document) -> Iterator[str]:
+    """Which compass the autopilot uses, and what to do with each, where there are several."""
+    every = roles(document)
+    if len(every) > 1:
+        for role in every:
+            use = f", {role.use}" if role.use else ""
+            yield f"Compass {role.compass}{use}: {role.action}."
 
 
 def _write(document: Document, kept: list[int], options: Options | None) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 from magcomp import __version__
 from magcomp.analysis import Options, parameter_set
 from magcomp.model import Analysis, Grade, Recording
-from magcomp.report import advice, as_json, html_tables, words
+from magcomp.report import advice, as_json, html_tables, plain, words
 from magcomp.report.evidence import CompassPlots, compass_plots
 from magcomp.report.figure import Figure, quantity_of
 from magcomp.report.figures import figures
@@ -83,12 +83,14 @@ def _head(numbers: Numbers, analysis: Analysis, options: Options | None) -> str:
     """Verdict first, then what to do, then the compasses at a glance."""
     document = numbers.document
     grade = document["verdict"]
+    first, *others = plain.pilots_lines(document)
+    more = "".join(f'<p class="more">{text(line)}</p>' for line in others)
     steps = "".join(f"<li>{with_code(step)}</li>" for step in advice.steps(document, options))
     return (
         f'<header class="verdict {grade}">'
         f'<p class="overline">Compass and motors · {text(analysis.source)} · '
         f"{text(words.duration(analysis.duration_s))}</p>"
-        f"<h1>{sign(grade)}<span>{text(advice.headline(document))}</span></h1></header>"
+        f"<h1>{sign(grade)}<span>{text(first)}</span></h1>{more}</header>"
         f"<main>{html_tables.overview(numbers)}"
         f'<section class="steps"><h2>What to do</h2><ol>{steps}</ol>{_download(analysis)}</section>'
     )

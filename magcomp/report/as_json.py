@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from magcomp import __version__
+from magcomp.judge.judge import error_at
 from magcomp.model import (
     UNITS,
     Analysis,
@@ -91,6 +92,15 @@ def head(source: str, duration_s: float, vehicle: Vehicle) -> dict[str, Any]:
             "component": vehicle.component,
             "firmware": vehicle.firmware,
             "device_ids": list(vehicle.device_ids),
+            "compasses": [
+                {
+                    "slot": compass.slot,
+                    "device_id": compass.device_id,
+                    "external": compass.external,
+                    "used": compass.used,
+                }
+                for compass in vehicle.compasses
+            ],
         },
     }
 
@@ -123,14 +133,38 @@ def _compass(result: CompassResult) -> dict[str, Any]:
             {"u": row.u, "before": row.before, "after": row.after, "p95": row.p95}
             for row in verdict.heading_error
         ],
+        "quoted": _quoted(verdict),
         "coverage": _coverage(verdict.coverage),
         "free": sorted(fit.free),
         "earth_mgauss": {"strength": fit.strength, "vertical": fit.vertical},
         "noise_mgauss": fit.noise,
+        "kept": fit.kept,
         "count": fit.count,
         "parameters": dict(result.parameters),
         "verdict": verdict.grade.value,
         "reasons": list(verdict.reasons),
+    }
+
+
+def _quoted(verdict: Verdict) -> dict[str, float | bool]:
+    """The one row of the heading errors that every sentence and card quotes.
+
+    It is the hover's, or the highest control quantity's where only there something is gained.
+    """
+    covered = verdict.coverage
+    middle = 0.5 * (covered.u_low + covered.u_high)
+    hover = covered.u_median if math.isfinite(covered.u_median) else middle
+    row, is_hover = error_at(verdict.heading_error, hover), True
+    if row.before <= row.p95:
+        top = error_at(verdict.heading_error, covered.u_high)
+        if top.before > top.p95:
+            row, is_hover = top, False
+    return {
+        "u": row.u,
+        "before": row.before,
+        "after": row.after,
+        "p95": row.p95,
+        "hover": is_hover,
     }
 
 
@@ -167,6 +201,7 @@ def _coverage(coverage: Coverage) -> dict[str, float]:
         "u_low": coverage.u_low,
         "u_high": coverage.u_high,
         "seconds": coverage.seconds,
+        "u_median": coverage.u_median,
     }
 
 

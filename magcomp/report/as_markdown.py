@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from magcomp.analysis import Options
-from magcomp.report import advice, words
+from magcomp.report import advice, plain, words
 from magcomp.report.figure import Quantity, quantity_of
 from magcomp.report.html_parts import parameter
 
@@ -27,8 +27,10 @@ def markdown(
     options
         What was asked for.
     """
+    first, *others = plain.pilots_lines(document)
     lines = [
-        f"# {advice.headline(document)}",
+        f"# {_plain(first)}",
+        *(f"\n{_plain(line)}" for line in others),
         "",
         f"{_plain(document['source'])}, {words.duration(document['duration_s'])}, "
         f"{_vehicle(document['vehicle'])}; magcomp {document['magcomp']}.",
@@ -59,14 +61,16 @@ def _compass(compass: Mapping[str, Any], present: Mapping[str, float]) -> Iterat
         [quantity.title, "in force (°)", "fit, expected (°)", "fit, 95 % bound (°)"],
         [
             [
-                f"{row['u'] * quantity.scale:.0f}",
-                f"{row['before']:.1f}",
+                _load(row, compass["coverage"], quantity),
+                f"≤ {row['p95']:.1f}" if plain.is_no_better(row) else f"{row['before']:.1f}",
                 f"{row['after']:.2f}",
                 f"{row['p95']:.2f}",
             ]
-            for row in compass["heading_error_deg"]
+            for row in plain.table_rows(compass)
         ],
     )
+    yield ""
+    yield "In brackets: reckoned, not flown. ≤: no better known than that."
     yield ""
     if compass["parameters"]:
         yield from _table(
@@ -80,6 +84,12 @@ def _compass(compass: Mapping[str, Any], present: Mapping[str, float]) -> Iterat
     yield from _found(compass, quantity)
 
 
+def _load(row: Mapping[str, float], covered: Mapping[str, float], quantity: Quantity) -> str:
+    """A control quantity; in brackets where it was not flown."""
+    u = f"{row['u'] * quantity.scale:.0f}"
+    return u if words.is_flown(row["u"], covered["u_low"], covered["u_high"]) else f"({u})"
+
+
 def _old(present: Mapping[str, float], name: str) -> str:
     return parameter(present[name]) if name in present else "not in the log"
 
@@ -87,8 +97,10 @@ def _old(present: Mapping[str, float], name: str) -> str:
 def _found(compass: Mapping[str, Any], quantity: Quantity) -> Iterator[str]:
     residual, coverage = compass["field_residual_mgauss"], compass["coverage"]
     parts = ", ".join(
-        words.with_std(value, std)
-        for value, std in zip(compass["interference_mgauss"], compass["std_mgauss"], strict=True)
+        f"{axis} {words.with_std(value, std)}"
+        for axis, value, std in zip(
+            words.AXES, compass["interference_mgauss"], compass["std_mgauss"], strict=True
+        )
     )
     per = "per A" if quantity.scale == 1.0 else "at full throttle"
     yield f"- Interference: {parts} mGauss {per}"

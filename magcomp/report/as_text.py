@@ -6,6 +6,7 @@ import io
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from rich.console import Console, Group, RenderableType
 from rich.padding import Padding
@@ -13,10 +14,20 @@ from rich.rule import Rule
 from rich.text import Text
 
 from magcomp import __version__
-from magcomp.model import CURRENT, Analysis, CompassResult, Grade, Recording, Vehicle, Verdict
-from magcomp.report import tables, words
+from magcomp.model import (
+    CURRENT,
+    Analysis,
+    CompassResult,
+    Grade,
+    HeadingError,
+    Recording,
+    Vehicle,
+    Verdict,
+)
+from magcomp.report import as_json, plain, tables, words
 from magcomp.report.bars import BEFORE_AFTER, Row, bars
 from magcomp.report.look import Look
+from magcomp.report.roles import roles
 
 GRADE_STYLE = {Grade.GOOD: "bold green", Grade.MARGINAL: "bold yellow", Grade.REJECTED: "bold red"}
 _GRADE_SIGN = {Grade.GOOD: "●", Grade.MARGINAL: "◐", Grade.REJECTED: "○"}
@@ -60,18 +71,21 @@ def analysis_text(
     report
         The report that was written, if any.
     verbose
-        Every parameter and every level.
+        The statistics, every parameter and every level.
     advise
         End with where the parameters are, and what to do next.
     """
+    document = as_json.analysis_object(analysis)
     return render(
         [
-            *heading(analysis.source, analysis.vehicle, analysis.duration_s),
-            *findings(analysis),
-            *evidence(analysis),
+            *_first_lines(plain.pilots_lines(document)),
+            *_whose(analysis.source, analysis.vehicle, analysis.duration_s),
+            *findings(analysis, document, verbose=verbose),
+            *_roles(document),
+            *evidence(analysis, verbose=verbose),
             *_parameters(parameters, present, verbose=verbose),
             *(_levels(analysis) if verbose else ()),
-            *(_ending(analysis, written, report) if advise else ()),
+            *(_ending(analysis, document, written, report) if advise else ()),
         ],
         look,
     )
@@ -80,7 +94,8 @@ def analysis_text(
 def check_text(recording: Recording, verdicts: Mapping[int, Verdict], kind: str, look: Look) -> str:
     """What ``magcomp check`` prints; ``kind`` is the control quantity of the table."""
     parts: list[RenderableType] = [
-        *heading(recording.source, recording.vehicle, recording.duration_s)
+        *_first_lines([plain.check_line(verdicts, kind)]),
+        *_whose(recording.source, recording.vehicle, recording.duration_s),
     ]
     results = [_Finding(compass, verdict, kind) for compass, verdict in sorted(verdicts.items())]
     parts.extend(_findings(results, ("in force", "at most (95 %)"), ("red", "yellow")))
@@ -144,8 +159,24 @@ def render(parts: Iterable[RenderableType], look: Look) -> str:
 
 
 def heading(source: str, vehicle: Vehicle, duration_s: float) -> Iterator[RenderableType]:
-    """Whose recording this is."""
-    yield Rule(Text(f"magcomp {__version__}", style="bold"), align="left", style="dim")
+    """The program's name, and whose recording this is."""
+    yield _rule()
+    yield from _whose(source, vehicle, duration_s)
+
+
+def _rule() -> RenderableType:
+    return Rule(Text(f"magcomp {__version__}", style="bold"), align="left", style="dim")
+
+
+def _first_lines(lines: Sequence[str]) -> Iterator[RenderableType]:
+    """What the pilot must know, before all else."""
+    yield _rule()
+    for line in lines:
+        yield Padding(Text(line, style="bold"), (0, 1))
+    yield Text()
+
+
+def _whose(source: str, vehicle: Vehicle, duration_s: float) -> Iterator[RenderableType]:
     yield Text(f" {words.printable(source)}", style="bold", no_wrap=True, overflow="ignore")
     yield Text(f" {words.duration(duration_s)} of {words.vehicle(vehicle)}")
     if vehicle.device_ids:
@@ -158,12 +189,30 @@ class _Finding:
     compass: int
     verdict: Verdict
     regressor: str
+    quoted: HeadingError | None = None
+    verbose: bool = True
+
+    @property
+    def reasons(self) -> Sequence[str]:
+        """What is said of it: without the judge's summary where the pilot's line says that."""
+        every = self.verdict.reasons
+        return every if self.verbose else plain.doubts(every, self.verdict.grade)
 
 
-def findings(analysis: Analysis) -> Iterator[RenderableType]:
+def findings(
+    analysis: Analysis, document: Mapping[str, Any] | None = None, *, verbose: bool = True
+) -> Iterator[RenderableType]:
     """Verdict, reasons and picture of each compass; of compasses that are alike, once."""
-    results = [_Finding(c.fit.compass, c.verdict, c.fit.regressor) for c in analysis.compasses]
+    document = as_json.analysis_object(analysis) if document is None else document
+    results = [
+        _Finding(c.fit.compass, c.verdict, c.fit.regressor, _row_of(found["quoted"]), verbose)
+        for c, found in zip(analysis.compasses, document["compasses"], strict=True)
+    ]
     return _findings(results, ("now", "corrected, at most (95 %)"), BEFORE_AFTER)
+
+
+def _row_of(quoted: Mapping[str, float]) -> HeadingError:
+    return HeadingError(*(quoted[name] for name in ("u", "before", "after", "p95")))
 
 
 def _findings(
@@ -173,14 +222,50 @@ def _findings(
         first = group[0]
         yield Text()
         yield _title(first.verdict.grade, [result.compass for result in group])
-        for reason in first.verdict.reasons:
+        for reason in first.reasons:
             yield Padding(Text(words.sentence(reason)), (0, 1, 0, 3))
-        rows = [
-            Row(words.quantity(row.u, first.regressor), (row.before, row.p95))
-            for row in first.verdict.heading_error
-        ]
         yield Text()
-        yield from bars("heading error", columns, rows, styles)
+        yield from bars("heading error", columns, list(_rows(first)), styles)
+        covered, table = first.verdict.coverage, first.verdict.heading_error
+        low, high = (words.quantity(u, first.regressor) for u in (covered.u_low, covered.u_high))
+        if not all(words.is_flown(row.u, covered.u_low, covered.u_high) for row in table):
+            note = f"in brackets: reckoned, not flown; the log covers {low} to {high}"
+            yield Text(f"      {note}", style="dim")
+
+
+def _rows(finding: _Finding) -> Iterator[Row]:
+    """The table, with the row that the sentences quote in its place."""
+    quoted, covered = finding.quoted, finding.verdict.coverage
+    table = list(finding.verdict.heading_error)
+    if quoted is not None:
+        near = {words.quantity(quoted.u, finding.regressor)}
+        table = [row for row in table if words.quantity(row.u, finding.regressor) not in near]
+        table = sorted([*table, quoted], key=lambda row: row.u)
+    for row in table:
+        u = words.quantity(row.u, finding.regressor)
+        flown = words.is_flown(row.u, covered.u_low, covered.u_high)
+        # What is in force is known no better than the fit is: below the fit's bound, its own
+        # error is that bound, and the correction must not look worse.
+        bounded = quoted is not None and row.before <= row.p95
+        yield Row(
+            u if flown else f"({u})",
+            (max(row.before, row.p95) if bounded else row.before, row.p95),
+            is_bound=bounded,
+            is_marked=row is quoted,
+        )
+
+
+def _roles(document: Mapping[str, Any]) -> Iterator[RenderableType]:
+    """Which compass the autopilot uses, and what to do with each."""
+    found = roles(document)
+    if document["only_to_look_at"] or len(found) < 2:
+        return
+    yield Text()
+    for role in found:
+        line = Text(f" compass {role.compass}", style="bold")
+        use = f" ({role.use})" if role.use else ""
+        line.append(f"{use}: {role.action}", style="not bold")
+        yield line
 
 
 def _title(grade: Grade, numbers: Sequence[int]) -> Text:
@@ -222,10 +307,10 @@ def _same(one: _Finding, other: _Finding) -> bool:
     )
 
 
-def evidence(analysis: Analysis) -> Iterator[RenderableType]:
-    """What was found and what it rests on, a column a compass."""
+def evidence(analysis: Analysis, *, verbose: bool = True) -> Iterator[RenderableType]:
+    """What was found and what it rests on, a column a compass; statistics where verbose."""
     yield Text()
-    yield tables.evidence(analysis.compasses)
+    yield tables.evidence(analysis.compasses, verbose=verbose)
     yield Text()
     for why, numbers in _by_method(analysis.compasses).items():
         of = "" if len(numbers) == len(analysis.compasses) else f"{words.compasses(numbers)}: "
@@ -268,7 +353,7 @@ def _levels(analysis: Analysis) -> Iterator[RenderableType]:
 
 
 def _ending(
-    analysis: Analysis, written: str | None, report: str | None
+    analysis: Analysis, document: Mapping[str, Any], written: str | None, report: str | None
 ) -> Iterator[RenderableType]:
     yield Text()
     accepted = analysis.grade is not Grade.REJECTED
@@ -277,6 +362,8 @@ def _ending(
         accepted = False
     elif written is not None:
         yield _last(f"Written to {words.printable(written)}.", _AFTER_WRITING)
+    elif plain.WRITE not in map(plain.answer_of, document["compasses"]) and accepted:
+        yield _last("Nothing needs to be written.", "-o compass.param writes a file all the same.")
     elif accepted:
         yield _last("Nothing is written yet.", "Add -o compass.param to write these parameters.")
     else:

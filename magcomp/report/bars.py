@@ -14,10 +14,16 @@ _WIDTH = 22
 
 @dataclass(frozen=True)
 class Row:
-    """One control quantity: its name, and a value in degrees for each of the columns."""
+    """One control quantity: its name, and a value in degrees for each of the columns.
+
+    ``is_bound`` says that the first value is known from above only, ``is_marked`` that this is the
+    row the sentences quote.
+    """
 
     label: str
     values: tuple[float, float]
+    is_bound: bool = False
+    is_marked: bool = False
 
 
 def bars(
@@ -28,13 +34,16 @@ def bars(
 ) -> Iterator[Text]:
     """A small plot: a line a control quantity, two bars a line, all to one scale."""
     largest = max((value for row in rows for value in row.values), default=0.0)
-    head = f"   {title:<16}"
+    head = f"      {title:<16}"
     yield Text(f"{head}{columns[0]:<{_WIDTH + 10}}{columns[1]}", style="dim")
     for row in rows:
-        line = Text(f"{row.label:>9}", style="dim")
-        for value, style in zip(row.values, styles, strict=True):
-            line.append(f"{value:8.1f}°  ", style="not dim")
-            line.append(f"{bar(value, largest, _WIDTH):<{_WIDTH}}", style=f"not dim {style}")
+        line = Text(f"{row.label:>12}", style="bold" if row.is_marked else "dim")
+        for index, (value, style) in enumerate(zip(row.values, styles, strict=True)):
+            sign = "≤" if row.is_bound and index == 0 else " "
+            line.append(f"{sign + f'{value:.1f}':>8}°  ", style="not bold not dim")
+            line.append(
+                f"{bar(value, largest, _WIDTH):<{_WIDTH}}", style=f"not bold not dim {style}"
+            )
         yield line
 
 

@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from magcomp.model import CURRENT
+from magcomp.report import words
 
 BEFORE, AFTER, INK, MUTED, GRID, SCALE = "@before", "@after", "@ink", "@muted", "@grid", "@scale"
 BEFORE_SOFT, AFTER_SOFT, SHADE = "@before-soft", "@after-soft", "@shade"
 AXIS_COLOURS = ("@x", "@y", "@z")
-AXIS_NAMES = ("x forward", "y right", "z down")
+AXIS_NAMES = words.AXES
 AXIS_SYMBOLS = ("circle", "square", "diamond")
 AXIS_DASHES = ("solid", "dash", "dot")
 

@@ -246,11 +246,11 @@ def space(corners: FloatArray | None = None) -> dict[str, Any]:
 
     return {
         "scene": {
-            "xaxis": side("x forward (mGauss)", 0),
+            "xaxis": side("forward (mGauss)", 0),
             # Down is drawn downwards, as the vehicle stands; reversing y too keeps the picture from
             # being a mirror image.
-            "yaxis": side("y right (mGauss)", 1),
-            "zaxis": side("z down (mGauss)", 2),
+            "yaxis": side("right (mGauss)", 1),
+            "zaxis": side("down (mGauss)", 2),
             "aspectmode": "data" if corners is None else "cube",
             "camera": {
                 "eye": {"x": 1.55, "y": -1.55, "z": 0.7},

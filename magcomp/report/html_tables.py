@@ -7,32 +7,37 @@ from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
 
 from magcomp.model import Recording
-from magcomp.report import words
+from magcomp.report import plain, words
 from magcomp.report.evidence import CompassPlots
 from magcomp.report.figure import Quantity, quantity_of
-from magcomp.report.html_parts import DASH, Numbers, badge, facts, minus, parameter, table, text
+from magcomp.report.html_parts import (
+    DASH,
+    Key,
+    Numbers,
+    badge,
+    facts,
+    minus,
+    parameter,
+    table,
+    text,
+)
 
 _MOST_DECIMALS = 4
-_COARSE_DEG = 0.1
-_NEARLY = 1.05
-"""A row this little above the range the log covers still counts as covered."""
 
 
 def overview(numbers: Numbers) -> str:
-    """A card a compass: verdict, heading error before and after, unexplained field."""
+    """A card a compass: verdict, heading error before and after."""
     cards = []
     for index, compass in enumerate(numbers.at("compasses")):
         quantity = quantity_of(compass["regressor"])
-        row = _covered_row(compass)
-        key = ("compasses", index, "heading_error_deg", row)
+        key = ("compasses", index, "quoted")
         u = numbers.show(*key, "u", decimals=0, scale=quantity.scale)
-        # A bound must not be rounded to nothing.
-        fine = 1 if numbers.at(*key, "p95") >= _COARSE_DEG else 2
-        before, bound = (numbers.show(*key, name, decimals=fine) for name in ("before", "p95"))
-        residual = ("compasses", index, "field_residual_mgauss")
-        was, left = (
-            numbers.show(*residual, name, decimals=1) for name in ("held_out_before", "held_out")
+        known = "p95" if plain.is_no_better(compass["quoted"]) else "before"
+        before, bound = (
+            numbers.show(*key, name, decimals=words.degree_decimals(numbers.at(*key, name)))
+            for name in (known, "p95")
         )
+        before = f"≤ {before}" if known == "p95" else before
         cards.append(
             f'<article class="card {compass["verdict"]}"><h3>Compass {compass["compass"]}'
             f"{badge(compass['verdict'])}</h3>"
@@ -40,8 +45,7 @@ def overview(numbers: Numbers) -> str:
             f'<span class="arrow" aria-label="falls to at most">→</span>'
             f'<span class="now">≤ {bound}°</span></p>'
             f"<p>heading error at {u} {_unit(quantity)}, now and {_with(compass['verdict'])} "
-            f"(95 % bound)</p>"
-            f"<p>unexplained field on data the fit did not see: {was} → {left} mGauss</p></article>"
+            f"(95 % bound)</p></article>"
         )
     return f'<div class="cards">{"".join(cards)}</div>'
 
@@ -54,36 +58,43 @@ def _unit(quantity: Quantity) -> str:
     return quantity.unit if quantity.scale == 1.0 else f"{quantity.unit} {quantity.name}"
 
 
-def _covered_row(compass: Mapping[str, object]) -> int:
-    """The last row of the table that the log covers."""
-    rows, coverage = compass["heading_error_deg"], compass["coverage"]
-    if not isinstance(rows, list) or not isinstance(coverage, dict):
-        return 0
-    covered = [k for k, row in enumerate(rows) if row["u"] <= _NEARLY * coverage["u_high"]]
-    return covered[-1] if covered else 0
-
-
 def heading_errors(numbers: Numbers, index: int, quantity: Quantity) -> str:
     """Heading error by control quantity."""
-    key = ("compasses", index, "heading_error_deg")
-    rows = []
-    for row in range(len(numbers.at(*key))):
-        u = numbers.show(*key, row, "u", decimals=0, scale=quantity.scale)
-        rows.append(
-            [
-                f"{u} {quantity.unit}",
-                *(
-                    f"{numbers.show(*key, row, name, decimals=digits)}°"
-                    for name, digits in (("before", 1), ("after", 2), ("p95", 2))
-                ),
-            ]
-        )
-    return table(
+    compass = numbers.at("compasses", index)
+    places: list[Key] = [("heading_error_deg", k) for k in range(len(compass["heading_error_deg"]))]
+    if all(row["u"] != compass["quoted"]["u"] for row in compass["heading_error_deg"]):
+        places.append(("quoted",))
+    keys: list[Key] = [("compasses", index, *place) for place in places]
+    rows = [
+        _heading_row(numbers, key, compass["coverage"], quantity)
+        for key in sorted(keys, key=lambda key: float(numbers.at(*key, "u")))
+    ]
+    note = (
+        '<p class="note">In brackets: reckoned, not flown. Bold: the row quoted above. ≤: what is '
+        "in force is known no better than that.</p>"
+    )
+    errors = table(
         [text(quantity.name.capitalize()), "In force", "Fit, expected", "Fit, 95 % bound"],
         rows,
         "Largest heading error over a full turn, level and tilted 20°",
         "numbers",
     )
+    return f"<div>{errors}{note}</div>"
+
+
+def _heading_row(
+    numbers: Numbers, key: Key, covered: Mapping[str, float], quantity: Quantity
+) -> list[str]:
+    row = numbers.at(*key)
+    u = f"{numbers.show(*key, 'u', decimals=0, scale=quantity.scale)} {quantity.unit}"
+    if not words.is_flown(row["u"], covered["u_low"], covered["u_high"]):
+        u = f'<span class="reckoned">({u})</span>'
+    after, bound = (numbers.show(*key, name, decimals=2) for name in ("after", "p95"))
+    now = numbers.show(*key, "before", decimals=1)
+    if plain.is_no_better(row):
+        now = f"≤\N{NO-BREAK SPACE}{numbers.show(*key, 'p95', decimals=1)}"
+    cells = [u, *(f"{cell}°" for cell in (now, after, bound))]
+    return [f"<strong>{cell}</strong>" for cell in cells] if key[-1] == "quoted" else cells
 
 
 def parameters(numbers: Numbers, index: int, present: Mapping[str, float]) -> str:
@@ -153,7 +164,7 @@ def _axis(numbers: Numbers, index: int, axis: int) -> str:
         numbers.show("compasses", index, name, axis, decimals=decimals)
         for name in ("interference_mgauss", "std_mgauss")
     )
-    return f"<span>{'xyz'[axis]} {value} <small>± {doubt}</small></span>"
+    return f"<span>{words.AXES[axis]} {value} <small>± {doubt}</small></span>"
 
 
 def _lag(numbers: Numbers, index: int, which: str) -> str:

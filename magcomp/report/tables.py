@@ -34,16 +34,23 @@ class _Columns:
         self.table.add_row(Text(f"   {name}", style="dim"), *map(Text, cells))
 
 
-def evidence(results: Sequence[CompassResult]) -> Table:
-    """Interference, unexplained field, lags, line and coverage."""
+def evidence(results: Sequence[CompassResult], *, verbose: bool = True) -> Table:
+    """Interference and coverage; where verbose, unexplained field, lags and line too."""
     fits = [result.fit for result in results]
     verdicts = [result.verdict for result in results]
     regressor = fits[0].regressor
     columns = _Columns([fit.compass for fit in fits])
     columns.section(words.interference_title(regressor))
-    for index, axis in enumerate(("forward", "right", "down")):
+    for index, axis in enumerate(words.AXES):
         pairs = ((f.interference[index], f.interference_std[index]) for f in fits)
         columns.row(axis, (words.with_std(float(value), float(std)) for value, std in pairs))
+    if verbose:
+        _statistics(columns, fits, verdicts)
+    _coverage(columns, verdicts, regressor)
+    return columns.table
+
+
+def _statistics(columns: _Columns, fits: Sequence[MotorFit], verdicts: Sequence[Verdict]) -> None:
     columns.section("unexplained field, mGauss")
     columns.row("now", (f"{v.residual.held_out_before:.1f}" for v in verdicts))
     columns.row("corrected", (f"{v.residual.after:.1f}" for v in verdicts))
@@ -54,13 +61,11 @@ def evidence(results: Sequence[CompassResult]) -> Table:
         (words.milliseconds(f.lags.field, f.lags_std.field) for f in fits),
     )
     columns.row(
-        f"behind {regressor}",
+        f"behind {fits[0].regressor}",
         (words.milliseconds(f.lags.regressor, f.lags_std.regressor) for f in fits),
     )
     columns.section("line of the shift, mGauss")
     columns.row("straight to", map(_line, fits))
-    _coverage(columns, verdicts, regressor)
-    return columns.table
 
 
 def check(verdicts: Mapping[int, Verdict], regressor: str) -> Table:
@@ -148,7 +153,7 @@ def levels(result: CompassResult) -> Table:
     fit = result.fit
     table = Table(box=None, pad_edge=False, padding=(0, 1), show_edge=False)
     table.add_column(Text(f"   {fit.regressor}", style="dim"), justify="right", min_width=10)
-    for axis in "xyz":
+    for axis in words.AXES:
         table.add_column(Text(axis, style="dim"), justify="right", min_width=15)
     table.add_column(Text("readings", style="dim"), justify="right", min_width=9)
     for level in fit.levels:

@@ -10,10 +10,33 @@ from magcomp.model import CURRENT, Vehicle
 
 _MOST_DECIMALS = 3
 
+AXES = ("forward", "right", "down")
+"""The vehicle's axes x, y, z in every view."""
+
+_NEARLY = 1.05
+"""A control quantity this little beyond what was flown still counts as flown."""
+
 
 def quantity(u: float, regressor: str) -> str:
     """A control quantity: ``20 A`` or ``40 %``."""
     return f"{u:.0f} A" if regressor == CURRENT else f"{100 * u:.0f} %"
+
+
+def is_flown(u: float, low: float, high: float) -> bool:
+    """Whether a control quantity lies in the range that was flown."""
+    return low / _NEARLY <= u <= high * _NEARLY
+
+
+def degree_decimals(value: float) -> int:
+    """Decimals of an angle that a pilot reads: a bound must not be rounded to nothing."""
+    if value >= 9.95:
+        return 0
+    return 1 if value >= 0.1 else 2
+
+
+def degrees(value: float) -> str:
+    """An angle in a sentence: ``18°``, ``0.4°`` or ``0.04°``."""
+    return f"{value:.{degree_decimals(value)}f}°"
 
 
 def interference_title(regressor: str) -> str:
