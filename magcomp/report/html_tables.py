@@ -26,7 +26,7 @@ _MOST_DECIMALS = 4
 
 
 def overview(numbers: Numbers) -> str:
-    """A card a compass: verdict, heading error before and after, unexplained field."""
+    """A card a compass: verdict, heading error before and after."""
     cards = []
     for index, compass in enumerate(numbers.at("compasses")):
         quantity = quantity_of(compass["regressor"])
@@ -38,10 +38,6 @@ def overview(numbers: Numbers) -> str:
             for name in (known, "p95")
         )
         before = f"≤ {before}" if known == "p95" else before
-        residual = ("compasses", index, "field_residual_mgauss")
-        was, left = (
-            numbers.show(*residual, name, decimals=1) for name in ("held_out_before", "held_out")
-        )
         cards.append(
             f'<article class="card {compass["verdict"]}"><h3>Compass {compass["compass"]}'
             f"{badge(compass['verdict'])}</h3>"
@@ -49,8 +45,7 @@ def overview(numbers: Numbers) -> str:
             f'<span class="arrow" aria-label="falls to at most">→</span>'
             f'<span class="now">≤ {bound}°</span></p>'
             f"<p>heading error at {u} {_unit(quantity)}, now and {_with(compass['verdict'])} "
-            f"(95 % bound)</p>"
-            f"<p>unexplained field on data the fit did not see: {was} → {left} mGauss</p></article>"
+            f"(95 % bound)</p></article>"
         )
     return f'<div class="cards">{"".join(cards)}</div>'
 
@@ -97,7 +92,7 @@ def _heading_row(
     after, bound = (numbers.show(*key, name, decimals=2) for name in ("after", "p95"))
     now = numbers.show(*key, "before", decimals=1)
     if plain.is_no_better(row):
-        now = f"≤ {numbers.show(*key, 'p95', decimals=1)}"
+        now = f"≤\N{NO-BREAK SPACE}{numbers.show(*key, 'p95', decimals=1)}"
     cells = [u, *(f"{cell}°" for cell in (now, after, bound))]
     return [f"<strong>{cell}</strong>" for cell in cells] if key[-1] == "quoted" else cells
 
