@@ -144,8 +144,9 @@ def is_new(value: FloatArray) -> BoolArray:
     >>> is_new(np.array([[1.0, 2.0, 3.0], [1.0, 2.0, 3.0], [1.0, 2.0, 4.0]])).tolist()
     [True, False, True]
     """
-    changed = np.any(np.diff(value, axis=0) != 0.0, axis=1)
-    return np.concatenate([[True], changed])
+    new = np.ones(len(value), dtype=bool)
+    new[1:] = np.any(np.diff(value, axis=0) != 0.0, axis=1)
+    return new
 
 
 def _away_from(time: FloatArray, moments: tuple[float, ...]) -> BoolArray:
