@@ -28,7 +28,7 @@ check: lint
 
 # Needs uv. The lock is what hosted CI installs; `make test` takes what pyproject.toml allows.
 lock:
-	@uv pip compile pyproject.toml --extra dev --universal --python-version 3.11 --generate-hashes \
+	@uv pip compile pyproject.toml --extra dev --extra fleet --universal --python-version 3.11 --generate-hashes \
 	  --no-annotate --quiet -o requirements-dev.lock
 
 benchmark: $(VENV)/installed-dev

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
+from markupsafe import Markup
+
 from magcomp import __version__
 from magcomp.fleet.aircraft import Aircraft
 from magcomp.fleet.answer import Fleet
@@ -135,7 +137,7 @@ def _flight(flight: Flight, apart: str, links: Mapping[str, str]) -> Sequence[st
     link = links.get(report_name(flight.digest).removesuffix(".html"))
     return (
         date(flight.when),
-        f'<a href="{text(link)}">{name}</a>' if link else name,
+        Markup('<a href="{}">{}</a>').format(link, name) if link else name,
         badge(flight.verdict),
         _degrees(flight.before_deg),
         _degrees(flight.bound_deg),
@@ -184,7 +186,9 @@ def _all(aircraft: Sequence[Aircraft], cards: int) -> str:
     rows = [
         (
             _anchored(each, number if number < cards else None),
-            f'<span class="{_GRADE[each.attention]}">{_CALLED[each.attention]}</span>',
+            Markup('<span class="{}">{}</span>').format(
+                _GRADE[each.attention], _CALLED[each.attention]
+            ),
             str(each.logs),
             date(each.newest),
             _degrees(each.before_deg),
@@ -201,7 +205,7 @@ def _all(aircraft: Sequence[Aircraft], cards: int) -> str:
 
 def _anchored(each: Aircraft, number: int | None) -> str:
     name = text(words.printable(each.name))
-    return name if number is None else f'<a href="#a{number}">{name}</a>'
+    return name if number is None else Markup('<a href="#a{}">{}</a>').format(number, name)
 
 
 def _unusable(flights: Sequence[Flight]) -> str:
