@@ -221,7 +221,8 @@ class _Away:
         pooled = self.all_together if whole else pool(self.motors[among], covariances)
         # Of the others' mean a flight is as far as that, unless it drags the mean along.
         far = self.shift(self.motors[among] - pooled.motor) > self.departure_deg / 2
-        far[np.argmin(np.trace(covariances, axis1=1, axis2=2))] = True
+        if far.any():
+            far[np.argmin(np.trace(covariances, axis1=1, axis2=2))] = True
         return np.flatnonzero(far)
 
 
@@ -235,6 +236,8 @@ def _agree(among: IntArray, away: _Away) -> tuple[IntArray, list[tuple[int, floa
     spare = len(among) // 3
     while len(among) > 2 and len(apart) < spare:
         which = away.suspects(among)
+        if not len(which):
+            break
         chance, by = chances_apart(away.motors[among], away.covariances[among], which)
         degrees = away.shift(by)
         chance = np.where(degrees > away.departure_deg, chance * len(among), 1.0)
