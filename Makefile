@@ -36,6 +36,7 @@ benchmark: $(VENV)/installed-dev
 	@$(BIN)/python benchmarks/coverage.py --seeds 3
 	@$(BIN)/python benchmarks/read.py
 	@$(BIN)/python benchmarks/fit_time.py
+	@$(BIN)/python benchmarks/fleet.py
 
 $(VENV)/bin/python:
 	@$(PYTHON) -c 'import sys; sys.exit("magcomp needs Python 3.11 or newer") if sys.version_info < (3, 11) else None'

@@ -87,6 +87,7 @@ def _head(fleet: Fleet, needing: Sequence[Aircraft]) -> str:
 
 def _card(each: Aircraft, number: int, links: Mapping[str, str]) -> str:
     grade = _GRADE[each.attention]
+    what = words.printable(f"{each.kind} {each.firmware}".strip())
     reasons = "".join(
         f"<li>{text(words.sentence(words.printable(one.text)))}</li>" for one in each.findings
     )
@@ -98,7 +99,7 @@ def _card(each: Aircraft, number: int, links: Mapping[str, str]) -> str:
     return (
         f'<section class="aircraft {each.attention.name.lower()}" id="a{number}">'
         f'<h3><span class="{grade}">{sign(grade)}</span>{text(words.printable(each.name))}</h3>'
-        f'<p class="note">{text(words.printable(f"{each.kind} {each.firmware}"))}, {known}; '
+        f'<p class="note">{text(what)}, {known}; '
         f"{counted(each.logs, 'log')}, newest {date(each.newest)}</p>"
         f'<ul class="reasons">{reasons}</ul>'
         f"{''.join(_compass(one, links) for one in each.compasses)}</section>"
@@ -124,7 +125,8 @@ def _compass(one: CompassHistory, links: Mapping[str, str]) -> str:
         )
     head = ("flight", "log", "verdict", "error in force", "fitted, 95 %", "up to", "remarks")
     return (
-        f"<details><summary>Compass {one.compass}: {len(one.flights)} flights</summary>{pooled}"
+        f"<details><summary>Compass {one.compass}: "
+        f"{counted(len(one.flights), 'flight')}</summary>{pooled}"
         f"{_dots(one.flights)}{table(head, rows, f'Compass {one.compass}, {note}', 'numbers')}"
         "</details>"
     )

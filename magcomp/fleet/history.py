@@ -136,8 +136,10 @@ def history(
             agreeing = agreeing[changed.first :]
             when = flights[usable[changed.first]].when
             findings.append(_changed(slot, changed.kind, when, drift, at, newest.regressor))
-        agreeing, apart = _agree(agreeing, motors, covariances, shift, limits.departure_deg)
-        pooled = pool(motors[agreeing], covariances[agreeing])
+        away = _Away(motors, covariances, shift, limits.departure_deg, pooled)
+        agreeing, apart = _agree(agreeing, away)
+        if len(agreeing) < len(usable):
+            pooled = pool(motors[agreeing], covariances[agreeing])
     scatter_deg = float(shift(np.full(3, pooled.scatter)))
     agree = len(agreeing) > 1 and scatter_deg <= limits.departure_deg
     if scatter_deg > limits.departure_deg:
@@ -202,13 +204,29 @@ def _covariances(flights: Sequence[Flight], which: Sequence[int]) -> FloatArray:
     return np.asarray(listed[:, _COVARIANCE])
 
 
-def _agree(
-    among: IntArray,
-    motors: FloatArray,
-    covariances: FloatArray,
-    shift: Callable[[FloatArray], FloatArray],
-    departure_deg: float,
-) -> tuple[IntArray, list[tuple[int, float]]]:
+@dataclass(frozen=True, eq=False)
+class _Away:
+    """Flights, and how to tell which are away from the others."""
+
+    motors: FloatArray
+    covariances: FloatArray
+    shift: Callable[[FloatArray], FloatArray]
+    departure_deg: float
+    all_together: Pooled
+
+    def suspects(self, among: IntArray) -> IntArray:
+        """Places in ``among`` of what may be far from the others: far from the mean, or heavy."""
+        whole = len(among) == len(self.motors)
+        covariances = self.covariances[among]
+        pooled = self.all_together if whole else pool(self.motors[among], covariances)
+        # Of the others' mean a flight is as far as that, unless it drags the mean along.
+        far = self.shift(self.motors[among] - pooled.motor) > self.departure_deg / 2
+        if far.any():
+            far[np.argmin(np.trace(covariances, axis1=1, axis2=2))] = True
+        return np.flatnonzero(far)
+
+
+def _agree(among: IntArray, away: _Away) -> tuple[IntArray, list[tuple[int, float]]]:
     """Leave out the flight that is furthest from the others until all agree.
 
     Of two that disagree nobody knows which is wrong, so both stay, with a scatter between them.
@@ -217,28 +235,18 @@ def _agree(
     apart: list[tuple[int, float]] = []
     spare = len(among) // 3
     while len(among) > 2 and len(apart) < spare:
-        which = _suspects(motors[among], covariances[among], shift, departure_deg)
-        chance, away = chances_apart(motors[among], covariances[among], which)
-        degrees = shift(away)
-        chance = np.where(degrees > departure_deg, chance * len(among), 1.0)
+        which = away.suspects(among)
+        if not len(which):
+            break
+        chance, by = chances_apart(away.motors[among], away.covariances[among], which)
+        degrees = away.shift(by)
+        chance = np.where(degrees > away.departure_deg, chance * len(among), 1.0)
         worst = int(np.argmin(chance))
         if chance[worst] >= SURE:
             break
         apart.append((int(among[which[worst]]), float(degrees[worst])))
         among = np.delete(among, which[worst])
     return among, apart
-
-
-def _suspects(
-    motors: FloatArray,
-    covariances: FloatArray,
-    shift: Callable[[FloatArray], FloatArray],
-    departure_deg: float,
-) -> IntArray:
-    """The flights that may be far from the others: those far from the mean, and its heaviest."""
-    far = shift(motors - pool(motors, covariances).motor) > departure_deg / 2
-    far[np.argmin(np.trace(covariances, axis1=1, axis2=2))] = True
-    return np.flatnonzero(far)
 
 
 def _shift(flight: Flight, at: float) -> Callable[[FloatArray], FloatArray]:

@@ -80,7 +80,8 @@ def pool(motors: FloatArray, covariances: FloatArray) -> Pooled:
     q = float(np.einsum("ki,kij,kj->", apart, weights, apart))
     spare = np.trace(weights.sum(0)) - np.trace(inverse @ (weights @ weights).sum(0))
     between = max((q - 3 * (len(motors) - 1)) / spare, 0.0) if len(motors) > 1 else 0.0
-    mean, inverse = _mean(motors, _inverse(covariances + between * np.eye(3)))
+    if between > 0.0:
+        mean, inverse = _mean(motors, _inverse(covariances + between * np.eye(3)))
     return Pooled(mean, inverse, float(np.sqrt(between)), len(motors))
 
 
