@@ -28,7 +28,7 @@ check: lint
 
 # Needs uv. The lock is what hosted CI installs; `make test` takes what pyproject.toml allows.
 lock:
-	@uv pip compile pyproject.toml --extra dev --universal --python-version 3.11 --generate-hashes \
+	@uv pip compile pyproject.toml --extra dev --extra fleet --universal --python-version 3.11 --generate-hashes \
 	  --no-annotate --quiet -o requirements-dev.lock
 
 benchmark: $(VENV)/installed-dev
@@ -36,6 +36,7 @@ benchmark: $(VENV)/installed-dev
 	@$(BIN)/python benchmarks/coverage.py --seeds 3
 	@$(BIN)/python benchmarks/read.py
 	@$(BIN)/python benchmarks/fit_time.py
+	@$(BIN)/python benchmarks/fleet.py
 
 $(VENV)/bin/python:
 	@$(PYTHON) -c 'import sys; sys.exit("magcomp needs Python 3.11 or newer") if sys.version_info < (3, 11) else None'

@@ -38,6 +38,11 @@ def expected_earth(recording: Recording) -> EarthField:
     attitude = interpolate(recording.attitude, time)
     down = gravity_direction(attitude[:, 0], attitude[:, 1])
     strength = float(np.median(np.linalg.norm(value, axis=1)))
+    if not strength > 0.0:
+        raise MissingDataError(
+            f"{recording.source} must hold a field that is not zero, or a position; instead "
+            f"compass {compass} reads zero throughout: check its wiring"
+        )
     vertical = float(np.median(np.einsum("ij,ij->i", value, down)))
     return EarthField(strength, float(np.arcsin(np.clip(vertical / strength, -1.0, 1.0))), 0.0)
 

@@ -27,6 +27,11 @@ ARMED_ENOUGH_S = 30.0
 """With this much armed time, disarmed time (carried about, parked on steel) is left out."""
 
 
+MOST_READINGS = 20_000
+"""Half an hour at 10 Hz. More are thinned before a fit: the bound of an hour's flight is that of
+its drift, not of its noise."""
+
+
 def readings(
     recording: Recording, compass: int, *, start: float = -np.inf, end: float = np.inf
 ) -> Readings:
@@ -131,6 +136,16 @@ def within(readings: Readings, known: Series) -> Readings:
     return readings if inside.all() else readings.where(inside)
 
 
+def thinned(readings: Readings, most: int = MOST_READINGS) -> Readings:
+    """Every k-th reading of a log of hours, so that at most ``most`` are left.
+
+    Neighbouring readings err alike: of ten a second, nine say little. Attitude and control
+    quantity keep all of their own values.
+    """
+    step = -(-len(readings) // most)
+    return readings if step <= 1 else readings.where(np.arange(len(readings)) % step == 0)
+
+
 def _list_compasses(recording: Recording) -> str:
     present = sorted(recording.field)
     return f"compass {', '.join(map(str, present))}" if present else "no compass at all"
@@ -144,8 +159,9 @@ def is_new(value: FloatArray) -> BoolArray:
     >>> is_new(np.array([[1.0, 2.0, 3.0], [1.0, 2.0, 3.0], [1.0, 2.0, 4.0]])).tolist()
     [True, False, True]
     """
-    changed = np.any(np.diff(value, axis=0) != 0.0, axis=1)
-    return np.concatenate([[True], changed])
+    new = np.ones(len(value), dtype=bool)
+    new[1:] = np.any(np.diff(value, axis=0) != 0.0, axis=1)
+    return new
 
 
 def _away_from(time: FloatArray, moments: tuple[float, ...]) -> BoolArray:

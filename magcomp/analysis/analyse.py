@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from magcomp import autopilots
-from magcomp.align import controls, expected_earth, has_position, readings, reported
+from magcomp.align import controls, expected_earth, has_position, readings, reported, thinned
 from magcomp.align.health import compass_complaints, current_complaints
 from magcomp.analysis.choose import with_speed_controllers
 from magcomp.analysis.emit import Emission, emit
@@ -16,7 +16,15 @@ from magcomp.analysis.multiplied import kinds_to_try, multiplied_notes, why_only
 from magcomp.analysis.vehicle_words import in_words_of
 from magcomp.earth import EarthField
 from magcomp.errors import MissingDataError, UsageError
-from magcomp.fit import METHODS, Problem, best_form, fit, require_readings
+from magcomp.fit import (
+    METHODS,
+    Problem,
+    best_form,
+    fit,
+    require_finite,
+    require_readings,
+    solvable,
+)
 from magcomp.judge import judge, judge_present
 from magcomp.model import (
     CURRENT,
@@ -28,6 +36,7 @@ from magcomp.model import (
     MotorFit,
     Recording,
     Verdict,
+    pack,
 )
 
 ESC = "esc"
@@ -181,7 +190,7 @@ def check(recording: Recording, options: Options | None = None) -> Mapping[int, 
     by_kind = reported(found)
     verdicts = {}
     for compass in compasses:
-        new = readings(recording, compass, start=wanted.start, end=wanted.end)
+        new = thinned(readings(recording, compass, start=wanted.start, end=wanted.end))
         kind = new.in_force[-1].regressor or found[0].kind
         if kind not in by_kind:
             raise MissingDataError(
@@ -189,7 +198,9 @@ def check(recording: Recording, options: Options | None = None) -> Mapping[int, 
                 f"{kind}; instead it holds {', '.join(by_kind)}"
             )
         problem = Problem(new, by_kind[kind], by_kind, earth)
-        verdict = judge_present(problem, complaints=_complaints(recording, compass, kind))
+        with solvable(compass):
+            verdict = judge_present(problem, complaints=_complaints(recording, compass, kind))
+        require_finite(compass, _bounds(verdict))
         verdicts[compass] = _in_words_of(recording, verdict)
     return verdicts
 
@@ -221,12 +232,19 @@ def _one(
     in_force: Mapping[str, Control],
     earth: EarthField,
 ) -> _Judged:
-    new = readings(recording, compass, start=wanted.start, end=wanted.end)
+    new = thinned(readings(recording, compass, start=wanted.start, end=wanted.end))
     require_readings(new)
-    problem = best_form([Problem(new, form, in_force, earth) for form in forms])
+    with solvable(compass):
+        problem = best_form([Problem(new, form, in_force, earth) for form in forms])
     complaints = _complaints(recording, compass, problem.control.kind)
-    found, verdict = judge(problem, fit(problem, wanted.method), complaints=complaints)
+    with solvable(compass):
+        found, verdict = judge(problem, fit(problem, wanted.method), complaints=complaints)
+    require_finite(compass, (found.covariance, pack(found.correction), *_bounds(verdict)))
     return _Judged(problem, found, _in_words_of(recording, verdict))
+
+
+def _bounds(verdict: Verdict) -> list[float]:
+    return [error for row in verdict.heading_error for error in (row.before, row.p95)]
 
 
 def _complaints(recording: Recording, compass: int, kind: str) -> tuple[str, ...]:

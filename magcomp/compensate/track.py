@@ -12,7 +12,7 @@ from magcomp.align import controls, expected_earth, interpolate, readings, repor
 from magcomp.compensate.compensator import Compensator
 from magcomp.compensate.fusion import Fusion, Motion, Reading, Tuning, fuse
 from magcomp.errors import MissingDataError
-from magcomp.fit import Problem, best_form
+from magcomp.fit import Problem, best_form, solvable
 from magcomp.fit.flight import estimate_lags
 from magcomp.geometry import gravity_direction, heading
 from magcomp.model import CURRENT, Control, Correction, FloatArray, Recording, Samples, Series
@@ -107,8 +107,9 @@ def track(
             f"{recording.source} must hold the {regressor} that the correction of compass "
             f"{compass} multiplies; instead it holds {', '.join(reported(found)) or 'neither'}"
         )
-    problem = best_form([Problem(new, form, reported(found), earth) for form in forms])
-    lags, _ = estimate_lags(problem, correction)
+    with solvable(compass):
+        problem = best_form([Problem(new, form, reported(found), earth) for form in forms])
+        lags, _ = estimate_lags(problem, correction)
     samples = problem.sample(lags)
     compensator = Compensator(correction, earth.declination)
     roll, pitch = samples.attitude[:, 0], samples.attitude[:, 1]

@@ -126,8 +126,10 @@ def _flights(numbers: Numbers, done: Mapping[str, Experiments]) -> str:
     rows = [["the paper", *paper]]
     for name in done:
         cells = [
-            f"{numbers.show('flights', name, course, 'largest_deg', decimals=1)} "
-            f"({numbers.show('flights', name, course, 'rms_deg', decimals=1)})"
+            numbers.show("flights", name, course, "largest_deg", decimals=1)
+            + " ("
+            + numbers.show("flights", name, course, "rms_deg", decimals=1)
+            + ")"
             for course in ("uncompensated", "compensated", "fused")
         ]
         apart = numbers.show("flights", name, "paths_apart_m", decimals=1)

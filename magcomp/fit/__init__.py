@@ -6,6 +6,7 @@ from magcomp.fit.flight import Problem
 from magcomp.fit.folds import folds
 from magcomp.fit.levels import centres_of_flight
 from magcomp.fit.line import line_through, orthogonal_line, paper_line, weighted_line
+from magcomp.fit.numerics import require_finite, solvable
 from magcomp.fit.residual import departures, residuals, spread
 from magcomp.fit.sweep import is_still
 
@@ -26,8 +27,10 @@ __all__ = [
     "orthogonal_line",
     "paper_line",
     "refit",
+    "require_finite",
     "require_readings",
     "residuals",
+    "solvable",
     "spread",
     "weighted_line",
 ]

@@ -209,7 +209,9 @@ def line_through(levels: tuple[Level, ...]) -> Line:
     inflated = covariances + np.einsum(
         "k,i,j->kij", (slope * u_std) ** 2, space.direction, space.direction
     )
-    chi2 = float(np.einsum("ki,kij,kj->", expected, np.linalg.inv(inflated), expected))
+    chi2 = float(
+        np.einsum("ki,kij,kj->", expected, np.linalg.pinv(inflated, hermitian=True), expected)
+    )
     return Line(
         point=space.point,
         direction=space.direction,

@@ -139,6 +139,16 @@ def _aircraft(
                 )
             )
         histories.append(history(slot, standing, same, limits))
+    if who[0] == "compasses" and any(
+        one.apart or one.scatter_deg > limits.departure_deg for one in histories
+    ):
+        changed.append(
+            Finding(
+                Attention.LOOK,
+                "its logs name no board, and its flights differ: they may be of several aircraft "
+                "of one build",
+            )
+        )
     findings = [*changed, *(each for one in histories for each in one.findings)]
     if not flights:
         findings.append(

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
+from markupsafe import Markup
+
 from magcomp import __version__
 from magcomp.fleet.aircraft import Aircraft
 from magcomp.fleet.answer import Fleet
@@ -85,6 +87,7 @@ def _head(fleet: Fleet, needing: Sequence[Aircraft]) -> str:
 
 def _card(each: Aircraft, number: int, links: Mapping[str, str]) -> str:
     grade = _GRADE[each.attention]
+    what = words.printable(f"{each.kind} {each.firmware}".strip())
     reasons = "".join(
         f"<li>{text(words.sentence(words.printable(one.text)))}</li>" for one in each.findings
     )
@@ -96,7 +99,7 @@ def _card(each: Aircraft, number: int, links: Mapping[str, str]) -> str:
     return (
         f'<section class="aircraft {each.attention.name.lower()}" id="a{number}">'
         f'<h3><span class="{grade}">{sign(grade)}</span>{text(words.printable(each.name))}</h3>'
-        f'<p class="note">{text(words.printable(f"{each.kind} {each.firmware}"))}, {known}; '
+        f'<p class="note">{text(what)}, {known}; '
         f"{counted(each.logs, 'log')}, newest {date(each.newest)}</p>"
         f'<ul class="reasons">{reasons}</ul>'
         f"{''.join(_compass(one, links) for one in each.compasses)}</section>"
@@ -122,7 +125,8 @@ def _compass(one: CompassHistory, links: Mapping[str, str]) -> str:
         )
     head = ("flight", "log", "verdict", "error in force", "fitted, 95 %", "up to", "remarks")
     return (
-        f"<details><summary>Compass {one.compass}: {len(one.flights)} flights</summary>{pooled}"
+        f"<details><summary>Compass {one.compass}: "
+        f"{counted(len(one.flights), 'flight')}</summary>{pooled}"
         f"{_dots(one.flights)}{table(head, rows, f'Compass {one.compass}, {note}', 'numbers')}"
         "</details>"
     )
@@ -133,7 +137,7 @@ def _flight(flight: Flight, apart: str, links: Mapping[str, str]) -> Sequence[st
     link = links.get(report_name(flight.digest).removesuffix(".html"))
     return (
         date(flight.when),
-        f'<a href="{text(link)}">{name}</a>' if link else name,
+        Markup('<a href="{}">{}</a>').format(link, name) if link else name,
         badge(flight.verdict),
         _degrees(flight.before_deg),
         _degrees(flight.bound_deg),
@@ -182,7 +186,9 @@ def _all(aircraft: Sequence[Aircraft], cards: int) -> str:
     rows = [
         (
             _anchored(each, number if number < cards else None),
-            f'<span class="{_GRADE[each.attention]}">{_CALLED[each.attention]}</span>',
+            Markup('<span class="{}">{}</span>').format(
+                _GRADE[each.attention], _CALLED[each.attention]
+            ),
             str(each.logs),
             date(each.newest),
             _degrees(each.before_deg),
@@ -199,7 +205,7 @@ def _all(aircraft: Sequence[Aircraft], cards: int) -> str:
 
 def _anchored(each: Aircraft, number: int | None) -> str:
     name = text(words.printable(each.name))
-    return name if number is None else f'<a href="#a{number}">{name}</a>'
+    return name if number is None else Markup('<a href="#a{}">{}</a>').format(number, name)
 
 
 def _unusable(flights: Sequence[Flight]) -> str:

@@ -103,7 +103,8 @@ def select(table: Any, logs: Sequence[Log], known: Known, since: float = -math.i
             if flight.path in lost:
                 unusable[flight.path] = flight
         elif flight.digest in wanted and not flight.when < since:
-            shown = flight._replace(path=wanted[flight.digest])
+            place = wanted[flight.digest]
+            shown = flight if flight.path == place else flight._replace(path=place)
             if flight.state == State.FITTED:
                 flights.setdefault((flight.digest, flight.compass), shown)
             else:

@@ -114,14 +114,14 @@ def history(
     newest = flights[-1]
     holds = holds_in(newest, limits)
     findings = list(_of_newest(slot, newest, holds, limits))
-    usable = [i for i, each in enumerate(flights) if _comparable(each, newest)]
+    usable = _comparable(flights)
     if not usable:
         return CompassHistory(
             slot, device_id, tuple(flights), newest.regressor, None, (), (), 0.0, holds,
             tuple(findings),
         )  # fmt: skip
     motors = np.array([flights[i].correction[_MOTOR] for i in usable])
-    covariances = np.array([flights[i].motor_covariance[_COVARIANCE] for i in usable])
+    covariances = _covariances(flights, usable)
     at = max(flights[i].u_high for i in usable)
     shift = _shift(newest, at)
     agreeing: IntArray = np.arange(len(usable))
@@ -136,8 +136,10 @@ def history(
             agreeing = agreeing[changed.first :]
             when = flights[usable[changed.first]].when
             findings.append(_changed(slot, changed.kind, when, drift, at, newest.regressor))
-        agreeing, apart = _agree(agreeing, motors, covariances, shift, limits.departure_deg)
-        pooled = pool(motors[agreeing], covariances[agreeing])
+        away = _Away(motors, covariances, shift, limits.departure_deg, pooled)
+        agreeing, apart = _agree(agreeing, away)
+        if len(agreeing) < len(usable):
+            pooled = pool(motors[agreeing], covariances[agreeing])
     scatter_deg = float(shift(np.full(3, pooled.scatter)))
     agree = len(agreeing) > 1 and scatter_deg <= limits.departure_deg
     if scatter_deg > limits.departure_deg:
@@ -181,24 +183,50 @@ def _scattering(slot: int, count: int, degrees: float, at: float, regressor: str
     )
 
 
-def _comparable(flight: Flight, newest: Flight) -> bool:
-    """Whether a fit is believed, and was made against what the newest was made against."""
-    return (
-        flight.verdict != Grade.REJECTED
-        and flight.regressor == newest.regressor
-        and bool(np.isfinite(flight.correction[_MOTOR]).all())
-        and bool(np.isfinite(flight.motor_covariance).all())
-        and bool(np.linalg.eigvalsh(flight.motor_covariance[_COVARIANCE])[0] > 0.0)
-    )
+def _comparable(flights: Sequence[Flight]) -> list[int]:
+    """The flights whose fit is believed, and made against what the newest was made against."""
+    regressor = flights[-1].regressor
+    asked = [
+        i
+        for i, each in enumerate(flights)
+        if each.verdict != Grade.REJECTED and each.regressor == regressor
+    ]
+    motors = np.array([flights[i].correction[_MOTOR] for i in asked]).reshape(-1, 3)
+    covariances = _covariances(flights, asked)
+    finite = np.isfinite(motors).all(1) & np.isfinite(covariances).all((1, 2))
+    covariances[~finite] = -np.eye(3)
+    sound = np.linalg.eigvalsh(covariances)[:, 0] > 0.0
+    return [i for i, good in zip(asked, sound, strict=True) if good]
 
 
-def _agree(
-    among: IntArray,
-    motors: FloatArray,
-    covariances: FloatArray,
-    shift: Callable[[FloatArray], FloatArray],
-    departure_deg: float,
-) -> tuple[IntArray, list[tuple[int, float]]]:
+def _covariances(flights: Sequence[Flight], which: Sequence[int]) -> FloatArray:
+    listed = np.array([flights[i].motor_covariance for i in which]).reshape(-1, 6)
+    return np.asarray(listed[:, _COVARIANCE])
+
+
+@dataclass(frozen=True, eq=False)
+class _Away:
+    """Flights, and how to tell which are away from the others."""
+
+    motors: FloatArray
+    covariances: FloatArray
+    shift: Callable[[FloatArray], FloatArray]
+    departure_deg: float
+    all_together: Pooled
+
+    def suspects(self, among: IntArray) -> IntArray:
+        """Places in ``among`` of what may be far from the others: far from the mean, or heavy."""
+        whole = len(among) == len(self.motors)
+        covariances = self.covariances[among]
+        pooled = self.all_together if whole else pool(self.motors[among], covariances)
+        # Of the others' mean a flight is as far as that, unless it drags the mean along.
+        far = self.shift(self.motors[among] - pooled.motor) > self.departure_deg / 2
+        if far.any():
+            far[np.argmin(np.trace(covariances, axis1=1, axis2=2))] = True
+        return np.flatnonzero(far)
+
+
+def _agree(among: IntArray, away: _Away) -> tuple[IntArray, list[tuple[int, float]]]:
     """Leave out the flight that is furthest from the others until all agree.
 
     Of two that disagree nobody knows which is wrong, so both stay, with a scatter between them.
@@ -207,14 +235,17 @@ def _agree(
     apart: list[tuple[int, float]] = []
     spare = len(among) // 3
     while len(among) > 2 and len(apart) < spare:
-        chance, away = chances_apart(motors[among], covariances[among])
-        degrees = shift(away)
-        chance = np.where(degrees > departure_deg, chance * len(among), 1.0)
+        which = away.suspects(among)
+        if not len(which):
+            break
+        chance, by = chances_apart(away.motors[among], away.covariances[among], which)
+        degrees = away.shift(by)
+        chance = np.where(degrees > away.departure_deg, chance * len(among), 1.0)
         worst = int(np.argmin(chance))
         if chance[worst] >= SURE:
             break
-        apart.append((int(among[worst]), float(degrees[worst])))
-        among = np.delete(among, worst)
+        apart.append((int(among[which[worst]]), float(degrees[worst])))
+        among = np.delete(among, which[worst])
     return among, apart
 
 

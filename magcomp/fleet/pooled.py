@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import special
 
-from magcomp.model.recording import FloatArray
+from magcomp.model.recording import FloatArray, IntArray
 
 SURE = 1e-3
 """Chance of being wrong below which flights are said to differ."""
@@ -80,7 +80,8 @@ def pool(motors: FloatArray, covariances: FloatArray) -> Pooled:
     q = float(np.einsum("ki,kij,kj->", apart, weights, apart))
     spare = np.trace(weights.sum(0)) - np.trace(inverse @ (weights @ weights).sum(0))
     between = max((q - 3 * (len(motors) - 1)) / spare, 0.0) if len(motors) > 1 else 0.0
-    mean, inverse = _mean(motors, _inverse(covariances + between * np.eye(3)))
+    if between > 0.0:
+        mean, inverse = _mean(motors, _inverse(covariances + between * np.eye(3)))
     return Pooled(mean, inverse, float(np.sqrt(between)), len(motors))
 
 
@@ -89,45 +90,51 @@ def _mean(motors: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArr
     return inverse @ np.einsum("kij,kj->i", weights, motors), inverse
 
 
-def chances_apart(motors: FloatArray, covariances: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """How unlikely each flight is, going by all the others.
+def chances_apart(
+    motors: FloatArray, covariances: FloatArray, which: IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """How unlikely some flights are, each going by all the others.
 
     Parameters
     ----------
     motors, covariances
-        As in :func:`pool`; at least two flights.
+        As in :func:`pool`; at least three flights.
+    which
+        Indices of the flights asked for, shape (n,).
 
     Returns
     -------
     chance
-        Of being as far from the others' mean, shape (k,).
+        Of being as far from the others' mean, shape (n,).
     apart
-        Difference from the others' mean, mGauss per unit, shape (k, 3).
+        Difference from the others' mean, mGauss per unit, shape (n, 3).
 
     Notes
     -----
-    For all flights at once: sums over the others are the whole sums less one term.
+    For all of them at once: sums over the others are the whole sums less one term.
     """
     count = len(motors)
     weights = _inverse(covariances)
     sums = _Sums(weights, motors)
-    others = _Sums(*(whole - each for whole, each in zip(sums.whole, sums.terms, strict=True)))
+    others = _Sums(
+        *(whole - each[which] for whole, each in zip(sums.whole, sums.terms, strict=True))
+    )
     squares = weights @ weights
     inverse = _inverse(others.weight)
     spare = np.trace(others.weight, axis1=1, axis2=2) - np.trace(
-        inverse @ (squares.sum(0) - squares), axis1=1, axis2=2
+        inverse @ (squares.sum(0) - squares[which]), axis1=1, axis2=2
     )
     excess = others.left(inverse) - 3 * (count - 2)
-    between = np.maximum(np.divide(excess, spare, where=spare > 0, out=np.zeros(count)), 0.0)
+    between = np.maximum(np.divide(excess, spare, where=spare > 0, out=np.zeros(len(which))), 0.0)
     # (C + τ²I)⁻¹ for every flight and every τ: of one C only the eigenvalues change.
     values, vectors = np.linalg.eigh(covariances)
     scaled = vectors[None] / (values[None] + between[:, None, None])[:, :, None, :]
-    again = np.einsum("ijab,jcb->ijac", scaled, vectors)
-    again[np.arange(count), np.arange(count)] = 0.0
+    again = scaled @ np.swapaxes(vectors, 1, 2)
+    again[np.arange(len(which)), which] = 0.0
     spread = _inverse(again.sum(1))
-    mean = np.einsum("iab,ijbc,jc->ia", spread, again, motors)
-    apart = motors - mean
-    spread = spread + covariances + between[:, None, None] * np.eye(3)
+    weighted = (again @ motors[:, :, None])[..., 0].sum(1)
+    apart = motors[which] - (spread @ weighted[..., None])[..., 0]
+    spread = spread + covariances[which] + between[:, None, None] * np.eye(3)
     distance = np.einsum("ki,ki->k", apart, np.linalg.solve(spread, apart[..., None])[..., 0])
     return np.asarray(special.chdtrc(3, distance)), apart
 

@@ -43,11 +43,15 @@ def known_of(store: Store) -> Known:
     by_size: dict[int, set[str]] = {}
     lost = set()
     for path, size, stamp, digest, state in zip(*columns, strict=True):
-        digests[path, size, stamp] = digest
         if state == State.LOST:
             lost.add((path, size, stamp))
-        elif digest:
+            continue
+        digests[path, size, stamp] = digest
+        if digest:
             by_size.setdefault(size, set()).add(digest)
+    # Rows come in no order: what was lost may have been found at another try.
+    lost -= digests.keys()
+    digests.update(dict.fromkeys(lost, ""))
     return Known(digests, by_size, frozenset(lost))
 
 

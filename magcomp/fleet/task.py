@@ -73,9 +73,9 @@ def carry_out(task: Task) -> Outcome:
     except MagcompError as error:
         rows = _unusable(log, digest, str(error), recording)
     except MemoryError:
-        rows = _unusable(
-            log, digest, "it must fit in a worker's memory: see --memory; instead it did not", None
-        )
+        # Not the log's fault: with more memory it may well be read.
+        why = "it must fit in a worker's memory: see --memory; instead it did not"
+        return Outcome(log, "", without_fit(log, "", why, state=State.LOST))
     # One log in ten thousand that nobody foresaw must not end the run.
     except Exception as error:
         rows = _unusable(log, digest, unforeseen(error), recording)

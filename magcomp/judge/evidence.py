@@ -115,7 +115,7 @@ def _field_heading(corrected: FloatArray, samples: Samples) -> FloatArray:
 
 def _sphere_share(corrected: FloatArray) -> float:
     """Share of equal-area cells of the sphere that the field's direction visited."""
-    unit = corrected / np.linalg.norm(corrected, axis=1, keepdims=True)
+    unit = corrected / np.maximum(np.linalg.norm(corrected, axis=1, keepdims=True), 1e-9)
     band = np.floor((unit[:, 2] + 1) / 2 * _SPHERE_BANDS).clip(0, _SPHERE_BANDS - 1)
     angle = np.arctan2(unit[:, 1], unit[:, 0]) + np.pi
     sector = np.floor(angle / (2 * np.pi) * _SPHERE_SECTORS).clip(0, _SPHERE_SECTORS - 1)

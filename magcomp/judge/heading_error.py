@@ -22,6 +22,7 @@ TILT_RAD = np.radians(20.0)
 
 _YAWS = np.radians(np.arange(0.0, 360.0, 10.0))
 _DRAWS = 400
+_MOST_ROWS = 50
 _CURRENTS = (0.0, 10.0, 20.0, 30.0, 40.0, 50.0)
 _THROTTLES = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
 
@@ -38,6 +39,8 @@ def control_grid(fit: MotorFit) -> FloatArray:
     grid = _CURRENTS if fit.regressor == CURRENT else _THROTTLES
     step = grid[1]
     if fit.regressor == CURRENT and fit.u_high > grid[-1] + step / 2:
+        # A monitor that claims a million amperes gets no million rows.
+        step *= max(1.0, np.ceil(fit.u_high / (step * _MOST_ROWS)))
         return np.arange(0.0, fit.u_high + step / 2, step)
     return np.array(grid)
 

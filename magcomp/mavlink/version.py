@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 
 def firmware_version(packed: int) -> str:
     """AUTOPILOT_VERSION.flight_sw_version, a byte each of major, minor, patch and type.
@@ -22,6 +24,8 @@ def firmware_version(packed: int) -> str:
 
 
 _BOARD = "board "
+# "CubeOrange 0037003A 30325116 38393532"
+_BOARD_LINE = re.compile(r"[A-Za-z][\w+-]*((?: [0-9A-F]{8}){3})")
 
 
 def board_name(packed: int) -> str:
@@ -60,6 +64,12 @@ def number_in_words(words: str) -> str:
     """
     number = b"".join(bytes.fromhex(word)[::-1] for word in words.split())
     return unique_id(number, 0)
+
+
+def number_in_line(line: str) -> str:
+    """The flight controller's own number in what it says of itself at start, or empty."""
+    words = _BOARD_LINE.fullmatch(line)
+    return number_in_words(words[1]) if words else ""
 
 
 def unique_id(uid2: bytes, uid: int) -> str:

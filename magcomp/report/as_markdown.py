@@ -8,7 +8,6 @@ from typing import Any
 from magcomp.analysis import Options
 from magcomp.report import advice, plain, words
 from magcomp.report.figure import Quantity, quantity_of
-from magcomp.report.html_parts import parameter
 
 _SPECIAL = str.maketrans({sign: f"\\{sign}" for sign in "\\`*_{}[]<>#|"})
 
@@ -76,7 +75,7 @@ def _compass(compass: Mapping[str, Any], present: Mapping[str, float]) -> Iterat
         yield from _table(
             ["parameter", "in the log", "new"],
             [
-                [f"`{name}`", _old(present, name), parameter(value)]
+                [f"`{name}`", _old(present, name), words.parameter(value)]
                 for name, value in compass["parameters"].items()
             ],
         )
@@ -91,7 +90,7 @@ def _load(row: Mapping[str, float], covered: Mapping[str, float], quantity: Quan
 
 
 def _old(present: Mapping[str, float], name: str) -> str:
-    return parameter(present[name]) if name in present else "not in the log"
+    return words.parameter(present[name]) if name in present else "not in the log"
 
 
 def _found(compass: Mapping[str, Any], quantity: Quantity) -> Iterator[str]:

@@ -194,7 +194,7 @@ def _thinned(count: int, most: int) -> IntArray:
 
 
 def _sphere(corrected: FloatArray) -> IntArray:
-    unit = corrected / np.linalg.norm(corrected, axis=1, keepdims=True)
+    unit = corrected / np.maximum(np.linalg.norm(corrected, axis=1, keepdims=True), 1e-9)
     azimuth = np.arctan2(unit[:, 1], unit[:, 0])
     counts, _, _ = np.histogram2d(
         unit[:, 2],

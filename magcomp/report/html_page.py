@@ -6,29 +6,25 @@ import json
 from collections.abc import Mapping
 from importlib.resources import files
 
+from markupsafe import Markup
+
 from magcomp.report.figure import Figure
-from magcomp.report.html_parts import text
+from magcomp.report.html_parts import figure, templates
 
 ASSETS = files("magcomp.report") / "assets"
 
 
-def canvas(name: str, figure: Figure) -> str:
+def canvas(name: str, picture: Figure) -> Markup:
     """Where a picture is drawn, with its title and caption.
 
     Parameters
     ----------
     name
         Unique on the page, and the figure's name in :func:`page`.
-    figure
+    picture
         The picture.
     """
-    wide = " wide" if figure.wide else ""
-    return (
-        f'<figure class="plot{wide}"><h4>{text(figure.title)}</h4>'
-        f'<div class="canvas" id="{name}" style="height:{figure.height}px" role="img" '
-        f'aria-label="{text(figure.title)}: {text(figure.caption)}"></div>'
-        f"<figcaption>{text(figure.caption)}</figcaption></figure>"
-    )
+    return figure(name, picture)
 
 
 def page(title: str, body: str, source: str, pictures: Mapping[str, Figure]) -> str:
@@ -51,28 +47,20 @@ def page(title: str, body: str, source: str, pictures: Mapping[str, Figure]) -> 
     style, script = (
         (ASSETS / name).read_text(encoding="utf-8") for name in ("report.css", "report.js")
     )
-    drawn = {
-        name: {"data": figure.data, "layout": figure.layout} for name, figure in pictures.items()
-    }
+    drawn = {name: {"data": each.data, "layout": each.layout} for name, each in pictures.items()}
     return (
-        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
-        # The page must work offline, so the browser is told to refuse everything from elsewhere.
-        '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; '
-        "style-src 'unsafe-inline'; script-src 'unsafe-inline' 'unsafe-eval'; "
-        'img-src data: blob:">'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        '<meta name="color-scheme" content="light dark">'
-        f"<title>{text(title)}</title><style>{style}</style></head>"
-        f'<body>{body}<noscript><p class="note">The pictures need JavaScript; every number is in '
-        "the tables.</p></noscript>"
-        f'<script type="application/json" id="result">{_inert(source)}</script>'
-        f'<script type="application/json" id="figures">{_inert(_compact(drawn))}</script>'
-        f"<script>{get_plotlyjs()}</script><script>{script}</script></body></html>\n"
+        templates()
+        .get_template("page.html.j2")
+        .render(
+            title=title,
+            style=style,
+            script=script,
+            body=body,
+            source=_inert(source),
+            figures=_inert(json.dumps(drawn, separators=(",", ":"), allow_nan=False)),
+            plotly=get_plotlyjs(),
+        )
     )
-
-
-def _compact(pictures: Mapping[str, object]) -> str:
-    return json.dumps(pictures, separators=(",", ":"), allow_nan=False)
 
 
 def _inert(content: str) -> str:

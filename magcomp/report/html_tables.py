@@ -5,58 +5,41 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
+from typing import Any
+
+from markupsafe import Markup
 
 from magcomp.model import Recording
 from magcomp.report import plain, words
 from magcomp.report.evidence import CompassPlots
 from magcomp.report.figure import Quantity, quantity_of
-from magcomp.report.html_parts import (
-    DASH,
-    Key,
-    Numbers,
-    badge,
-    facts,
-    minus,
-    parameter,
-    table,
-    text,
-)
+from magcomp.report.html_parts import DASH, Key, Numbers, facts, minus, table
 
 _MOST_DECIMALS = 4
 
 
-def overview(numbers: Numbers) -> str:
-    """A card a compass: verdict, heading error before and after, unexplained field."""
-    cards = []
+def cards(numbers: Numbers) -> list[dict[str, Any]]:
+    """A card a compass: verdict, heading error before and after."""
+    found = []
     for index, compass in enumerate(numbers.at("compasses")):
         quantity = quantity_of(compass["regressor"])
         key = ("compasses", index, "quoted")
-        u = numbers.show(*key, "u", decimals=0, scale=quantity.scale)
         known = "p95" if plain.is_no_better(compass["quoted"]) else "before"
-        before, bound = (
+        now, bound = (
             numbers.show(*key, name, decimals=words.degree_decimals(numbers.at(*key, name)))
             for name in (known, "p95")
         )
-        before = f"≤ {before}" if known == "p95" else before
-        residual = ("compasses", index, "field_residual_mgauss")
-        was, left = (
-            numbers.show(*residual, name, decimals=1) for name in ("held_out_before", "held_out")
+        found.append(
+            {
+                "number": compass["compass"],
+                "grade": compass["verdict"],
+                "u": numbers.show(*key, "u", decimals=0, scale=quantity.scale),
+                "unit": _unit(quantity),
+                "now": "≤ " + now if known == "p95" else now,
+                "bound": bound,
+            }
         )
-        cards.append(
-            f'<article class="card {compass["verdict"]}"><h3>Compass {compass["compass"]}'
-            f"{badge(compass['verdict'])}</h3>"
-            f'<p class="figure"><span class="was">{before}°</span>'
-            f'<span class="arrow" aria-label="falls to at most">→</span>'
-            f'<span class="now">≤ {bound}°</span></p>'
-            f"<p>heading error at {u} {_unit(quantity)}, now and {_with(compass['verdict'])} "
-            f"(95 % bound)</p>"
-            f"<p>unexplained field on data the fit did not see: {was} → {left} mGauss</p></article>"
-        )
-    return f'<div class="cards">{"".join(cards)}</div>'
-
-
-def _with(verdict: str) -> str:
-    return "with a fit that is not to be trusted" if verdict == "rejected" else "with the fit"
+    return found
 
 
 def _unit(quantity: Quantity) -> str:
@@ -74,32 +57,33 @@ def heading_errors(numbers: Numbers, index: int, quantity: Quantity) -> str:
         _heading_row(numbers, key, compass["coverage"], quantity)
         for key in sorted(keys, key=lambda key: float(numbers.at(*key, "u")))
     ]
-    note = (
-        '<p class="note">In brackets: reckoned, not flown. Bold: the row quoted above. ≤: what is '
-        "in force is known no better than that.</p>"
-    )
     errors = table(
-        [text(quantity.name.capitalize()), "In force", "Fit, expected", "Fit, 95 % bound"],
+        [quantity.name.capitalize(), "In force", "Fit, expected", "Fit, 95 % bound"],
         rows,
         "Largest heading error over a full turn, level and tilted 20°",
         "numbers",
     )
-    return f"<div>{errors}{note}</div>"
+    return Markup(
+        '<div>{}<p class="note">In brackets: reckoned, not flown. Bold: the row quoted above. ≤: '
+        "what is in force is known no better than that.</p></div>"
+    ).format(errors)
 
 
 def _heading_row(
     numbers: Numbers, key: Key, covered: Mapping[str, float], quantity: Quantity
-) -> list[str]:
+) -> list[Markup]:
     row = numbers.at(*key)
-    u = f"{numbers.show(*key, 'u', decimals=0, scale=quantity.scale)} {quantity.unit}"
+    u = numbers.show(*key, "u", decimals=0, scale=quantity.scale) + f" {quantity.unit}"
     if not words.is_flown(row["u"], covered["u_low"], covered["u_high"]):
-        u = f'<span class="reckoned">({u})</span>'
+        u = "(" + u + ")"
     after, bound = (numbers.show(*key, name, decimals=2) for name in ("after", "p95"))
     now = numbers.show(*key, "before", decimals=1)
     if plain.is_no_better(row):
-        now = f"≤ {numbers.show(*key, 'p95', decimals=1)}"
-    cells = [u, *(f"{cell}°" for cell in (now, after, bound))]
-    return [f"<strong>{cell}</strong>" for cell in cells] if key[-1] == "quoted" else cells
+        now = "≤\N{NO-BREAK SPACE}" + numbers.show(*key, "p95", decimals=1)
+    cells = [u, *(cell + "°" for cell in (now, after, bound))]
+    if key[-1] == "quoted":
+        return [Markup("<strong>{}</strong>").format(cell) for cell in cells]
+    return cells
 
 
 def parameters(numbers: Numbers, index: int, present: Mapping[str, float]) -> str:
@@ -108,26 +92,24 @@ def parameters(numbers: Numbers, index: int, present: Mapping[str, float]) -> st
     changed, same = [], []
     for name, value in numbers.at(*key).items():
         old = present.get(name)
-        shown = minus(parameter(old)) if old is not None else "not in the log"
-        row = [f"<code>{text(name)}</code>", shown, numbers.show(*key, name)]
+        shown = minus(words.parameter(old)) if old is not None else "not in the log"
+        row = [Markup("<code>{}</code>").format(name), shown, numbers.show(*key, name)]
         if old is not None and old == value:
             same.append(row)
         else:
             changed.append(row)
     head = ["Parameter", "In the log", "New"]
     if not changed and not same:
-        return "<p>Nothing would be written for this compass.</p>"
+        return Markup("<p>Nothing would be written for this compass.</p>")
     page = (
         table(head, changed, "Parameters that change", "numbers parameters")
         if changed
-        else "<p>The vehicle holds these values already.</p>"
+        else Markup("<p>The vehicle holds these values already.</p>")
     )
     if same:
-        page += (
-            f"<details><summary>{len(same)} parameters stay as they are</summary>"
-            + table(head, same, "Parameters that stay", "numbers parameters")
-            + "</details>"
-        )
+        page += Markup(
+            "<details><summary>{} parameters stay as they are</summary>{}</details>"
+        ).format(len(same), table(head, same, "Parameters that stay", "numbers parameters"))
     return page
 
 
@@ -139,7 +121,7 @@ def findings(numbers: Numbers, index: int, quantity: Quantity) -> str:
     pairs = [
         (
             interference,
-            "".join(_axis(numbers, index, axis) for axis in range(3)),
+            Markup("").join(_axis(numbers, index, axis) for axis in range(3)),
         ),
         ("Field behind attitude", _lag(numbers, index, "field")),
         (f"{quantity.name.capitalize()} against field", _lag(numbers, index, "regressor")),
@@ -147,14 +129,16 @@ def findings(numbers: Numbers, index: int, quantity: Quantity) -> str:
         ("Unexplained field, fit", _residual(numbers, index, "after")),
         (
             "The same on unseen data",
-            f"{_residual(numbers, index, 'held_out_before')} → "
-            f"{_residual(numbers, index, 'held_out')}",
+            _residual(numbers, index, "held_out_before")
+            + " → "
+            + _residual(numbers, index, "held_out"),
         ),
         ("Straightness of the line", _straightness(numbers, index)),
         (
             "Earth’s field",
-            f"{numbers.show(*compass, 'earth_mgauss', 'strength', decimals=0)} mGauss, vertical "
-            f"{numbers.show(*compass, 'earth_mgauss', 'vertical', decimals=0)}",
+            numbers.show(*compass, "earth_mgauss", "strength", decimals=0)
+            + " mGauss, vertical "
+            + numbers.show(*compass, "earth_mgauss", "vertical", decimals=0),
         ),
     ]
     return facts(pairs, whole=interference)
@@ -169,7 +153,7 @@ def _axis(numbers: Numbers, index: int, axis: int) -> str:
         numbers.show("compasses", index, name, axis, decimals=decimals)
         for name in ("interference_mgauss", "std_mgauss")
     )
-    return f"<span>{words.AXES[axis]} {value} <small>± {doubt}</small></span>"
+    return Markup("<span>{} {} <small>± {}</small></span>").format(words.AXES[axis], value, doubt)
 
 
 def _lag(numbers: Numbers, index: int, which: str) -> str:
@@ -178,7 +162,7 @@ def _lag(numbers: Numbers, index: int, which: str) -> str:
     if value == DASH:
         return "not visible to this method"
     std = numbers.show(*key, "lag_std_s", which, decimals=0, scale=1000.0)
-    return f"{value} ms <small>± {std}</small>"
+    return Markup("{} ms <small>± {}</small>").format(value, std)
 
 
 def _residual(numbers: Numbers, index: int, which: str) -> str:
@@ -189,9 +173,9 @@ def _straightness(numbers: Numbers, index: int) -> str:
     key = ("compasses", index, "line")
     if numbers.at(*key) is None:
         return DASH
-    return (
-        f"{numbers.show(*key, 'straightness', decimals=4)} "
-        f"<small>({numbers.show(*key, 'rms_mgauss', decimals=2)} mGauss off it)</small>"
+    return Markup("{} <small>({} mGauss off it)</small>").format(
+        numbers.show(*key, "straightness", decimals=4),
+        numbers.show(*key, "rms_mgauss", decimals=2),
     )
 
 
@@ -202,11 +186,11 @@ def coverage(numbers: Numbers, index: int, plots: CompassPlots, quantity: Quanti
         numbers.show(*key, name, decimals=0, scale=quantity.scale) for name in ("u_low", "u_high")
     )
     pairs = [
-        (quantity.name.capitalize(), f"{low} to {high} {quantity.unit}"),
-        ("Headings", f"{numbers.show(*key, 'heading', decimals=0, scale=100.0)} % of a turn"),
-        ("Directions", f"{numbers.show(*key, 'sphere', decimals=0, scale=100.0)} % of the sphere"),
-        ("Largest tilt", f"{numbers.show(*key, 'tilt_deg', decimals=0)}°"),
-        ("Time in use", f"{numbers.show(*key, 'seconds', decimals=0)} s"),
+        (quantity.name.capitalize(), low + " to " + high + f" {quantity.unit}"),
+        ("Headings", numbers.show(*key, "heading", decimals=0, scale=100.0) + " % of a turn"),
+        ("Directions", numbers.show(*key, "sphere", decimals=0, scale=100.0) + " % of the sphere"),
+        ("Largest tilt", numbers.show(*key, "tilt_deg", decimals=0) + "°"),
+        ("Time in use", numbers.show(*key, "seconds", decimals=0) + " s"),
         (
             "New readings",
             f"{plots.count} of {plots.reported_count} messages"
@@ -224,12 +208,12 @@ def vehicle(numbers: Numbers, recording: Recording) -> str:
     """Who flew, and what the recording holds."""
     of = recording.vehicle
     pairs = [
-        ("Vehicle", text(words.vehicle(of))),
-        ("Board", text(of.board) or "not named in the log"),
+        ("Vehicle", words.vehicle(of)),
+        ("Board", of.board or "not named in the log"),
         ("Compass device ids", ", ".join(map(str, of.device_ids)) or "not in the log"),
         ("Recorded", _date(recording.start_unix_s)),
-        ("Length", f"{numbers.show('duration_s', decimals=0)} s"),
-        ("Log", text(numbers.at("source"))),
+        ("Length", numbers.show("duration_s", decimals=0) + " s"),
+        ("Log", numbers.at("source")),
     ]
     return facts(pairs)
 
@@ -251,7 +235,7 @@ def quality(recording: Recording) -> str:
         ("Damaged messages", str(report.bad_checksum)),
         ("Bytes of no message", str(report.skipped)),
         ("Repeated messages", str(report.duplicates)),
-        ("Other systems left out", text(others) or "none"),
+        ("Other systems left out", others or "none"),
         *_rates(recording),
     ]
     return facts(pairs)

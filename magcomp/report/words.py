@@ -65,6 +65,11 @@ def number(value: float, decimals: int = _MOST_DECIMALS) -> str:
     return text.rstrip("0").rstrip(".") if decimals else text
 
 
+def parameter(value: float) -> str:
+    """A parameter's value: short, and finer than a heading can tell."""
+    return number(value, 4)
+
+
 def milliseconds(value: float, std: float) -> str:
     """A lag in seconds as milliseconds with its standard error; a dash where there is none."""
     if not math.isfinite(value):

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from magcomp.mavlink.heartbeat import is_armed
 from magcomp.mavlink.messages import Message, Table, text
 from magcomp.mavlink.parameters import decode_values, encoding
-from magcomp.mavlink.version import board_name, firmware_version, number_in_words, unique_id
+from magcomp.mavlink.version import board_name, firmware_version, number_in_line, unique_id
 from magcomp.model import FloatArray, ParameterChange, Series
 
 STANDARD_GRAVITY = 9.80665
@@ -26,8 +26,6 @@ _FIX_3D = 3
 _SIMULATION_PREFIX = "SIM_"
 
 # "ArduCopter V4.6.3 (92b0cd78)", "APM:Copter V3.4-dev (bdddfae5)"
-# "CubeOrange 0037003A 30325116 38393532"
-_NUMBER = re.compile(r"[A-Za-z][\w+-]*((?: [0-9A-F]{8}){3})")
 _BANNER = re.compile(r"^(?:Ardu|APM:)\w+ V(\d+\.\d+(?:\.\d+)?[\w.-]*)")
 
 
@@ -217,8 +215,8 @@ def uid(messages: Messages) -> str:
             return number
     if Message.STATUSTEXT in messages:
         for line in reversed(text(messages[Message.STATUSTEXT].table["text"])):
-            if words := _NUMBER.fullmatch(line):
-                return number_in_words(words[1])
+            if number := number_in_line(line):
+                return number
     return ""
 
 

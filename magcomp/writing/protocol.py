@@ -246,7 +246,7 @@ class WriteSequence:
         if uid and wanted and uid != wanted:
             why = f"the flight controller must be {wanted}; instead it is {uid}"
             self._end(Reason.ANOTHER_VEHICLE, why)
-        elif uid:
+        else:
             self._exchange.answer(_OWN_NUMBER)
 
     def _take_other_value(self, name: str, value: float, now: float) -> None:

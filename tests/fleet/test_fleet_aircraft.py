@@ -62,6 +62,10 @@ def test_flights_of_which_each_says_something_else_have_no_common_answer() -> No
     rng = np.random.default_rng(1)
     (found,) = aircraft(selected([row(k, MOTOR + rng.normal(size=3)) for k in range(6)]))
     assert not found.compasses[0].agree
+    assert not any("several aircraft" in each.text for each in found.findings)
+    rows = [row(k, MOTOR + rng.normal(size=3), uid="") for k in range(6)]
+    (weak,) = aircraft(selected(rows))
+    assert any("several aircraft" in each.text for each in weak.findings)
     assert any("no common answer" in each.text for each in found.findings)
     assert all(each.compasses[0].agree for each in aircraft(selected(scattered(6))))
     assert not aircraft(selected(scattered(1)))[0].compasses[0].agree

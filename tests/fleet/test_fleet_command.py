@@ -100,3 +100,35 @@ def test_a_log_that_has_gone_is_a_row(tmp_path: Path) -> None:
     path.unlink()
     outcome = carry_out(Task(log))
     assert (outcome.digest, outcome.rows[0].state) == ("", State.UNUSABLE)
+
+
+def test_a_log_without_memory_for_it_can_be_tried_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "huge.tlog"
+    path.write_bytes(b"x")
+
+    def full(_: Path) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr("magcomp.fleet.task.read", full)
+    (log,) = find([str(path)])
+    outcome = carry_out(Task(log))
+    assert (outcome.digest, outcome.rows[0].state) == ("", State.LOST)
+    assert "--memory" in outcome.rows[0].why
+
+
+def test_a_folder_is_watched(
+    logs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (logs / "a.tlog").unlink()
+    (logs / "deep" / "b.TLOG").unlink()
+    page = tmp_path / "page.html"
+    looks = ["--every", "0.1", "--looks", "2", "--workers", "1", "-o", str(tmp_path / "out")]
+    assert run(["fleet", "watch", str(logs), *looks, "--html", str(page)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.partition(": ")[0] for line in sorted(lines)] == [
+        str(logs / "c.BIN"),
+        str(logs / "d.log"),
+    ]
+    assert "c.BIN" in page.read_text()

@@ -17,6 +17,7 @@ from made_flights import log, row
 
 from magcomp.errors import OutputError
 from magcomp.fleet.as_table import cell, csv_text, write_table
+from magcomp.fleet.flights import select
 from magcomp.fleet.row import COLUMNS, Log, Row, State, without_fit
 from magcomp.fleet.run import carry_out_all, known_of, lost, to_do
 from magcomp.fleet.store import Store, table_of
@@ -101,7 +102,11 @@ def test_a_lost_log_is_tried_again_only_when_asked(tmp_path: Path) -> None:
     store = Store(tmp_path)
     store.append(lost(Task(log(0)), "it died").rows)
     assert not list(run([log(0)], store))
+    assert select(store.read(), [log(0)], known_of(store)).unusable[0].why == "it died"
     assert len(list(run([log(0)], store, again=True))) == 1
+    found = select(store.read(), [log(0)], known_of(store))
+    assert (len(found.flights), len(found.unusable)) == (1, 0)
+    assert not list(run([log(0)], store, again=True))
 
 
 def test_many_small_files_become_one(tmp_path: Path) -> None:

@@ -89,7 +89,10 @@ def test_a_flight_is_followed_to_its_end_and_refits_come_by_themselves(flight):
     assert shown.situation is Situation.FLYING
     assert shown.grade is not None
     assert shown.coverage.counts.sum() > 0
-    assert sum(shown.level_seconds) == pytest.approx(vehicle.duration_s, rel=0.1)
+    # The vehicle lives on after its programme, for as long as a busy machine takes to notice.
+    recorded = session.recording().duration_s
+    assert sum(shown.level_seconds) == pytest.approx(recorded, rel=0.1)
+    assert sum(shown.level_seconds) > 0.9 * vehicle.duration_s
 
 
 def test_snapshots_are_cheap(flight):

@@ -130,7 +130,10 @@ def test_without_a_battery_monitor_there_is_no_current(tmp_path):
 def test_the_truth_file_has_the_fixtures_form(simulated, tmp_path):
     simulated[1].write(tmp_path / "truth.json")
     written = json.loads((tmp_path / "truth.json").read_text())
-    for path in FIXTURES.glob("*.json"):
+    # Beside a .tlog: the simulated vehicle is an ArduCopter, and PX4's truth has another form.
+    ours = [path for path in FIXTURES.glob("*.json") if path.with_suffix(".tlog").exists()]
+    assert ours
+    for path in ours:
         given = json.loads(path.read_text())
         missing = given.keys() - written.keys()
         assert missing <= {"start_mot", "start_ofs"}, path

@@ -182,6 +182,11 @@ async def test_every_screen_is_drawn_in_ascii_where_there_is_nothing_else(tmp_pa
         app.action_go("fit")
         await until(pilot, lambda: "Heading error" in screen(app))
         assert scripted.picture(app).isascii()
+        app.set_work(made.work(live=True))
+        app.follow(scripted.ScriptedSession(made.snapshot(connected=False)))
+        app.action_go("record")
+        await until(pilot, lambda: "as last heard" in screen(app))
+        assert scripted.picture(app).isascii()
 
 
 @given(share=st.floats(allow_nan=False), width=st.integers(0, 200))
