@@ -2,7 +2,7 @@
 
 from magcomp.align.control import controls, reported
 from magcomp.align.expected import expected_earth, has_position
-from magcomp.align.readings import readings, within
+from magcomp.align.readings import readings, thinned, within
 from magcomp.align.sample import interpolate, sample
 
 __all__ = [
@@ -13,5 +13,6 @@ __all__ = [
     "readings",
     "reported",
     "sample",
+    "thinned",
     "within",
 ]

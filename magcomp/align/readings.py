@@ -27,6 +27,11 @@ ARMED_ENOUGH_S = 30.0
 """With this much armed time, disarmed time (carried about, parked on steel) is left out."""
 
 
+MOST_READINGS = 20_000
+"""Half an hour at 10 Hz. More are thinned before a fit: the bound of an hour's flight is that of
+its drift, not of its noise."""
+
+
 def readings(
     recording: Recording, compass: int, *, start: float = -np.inf, end: float = np.inf
 ) -> Readings:
@@ -129,6 +134,16 @@ def within(readings: Readings, known: Series) -> Readings:
     """The readings at times where another quantity is known, not interpolated across a gap."""
     inside = ~_in_gap(readings.time, known.time)
     return readings if inside.all() else readings.where(inside)
+
+
+def thinned(readings: Readings, most: int = MOST_READINGS) -> Readings:
+    """Every k-th reading of a log of hours, so that at most ``most`` are left.
+
+    Neighbouring readings err alike: of ten a second, nine say little. Attitude and control
+    quantity keep all of their own values.
+    """
+    step = -(-len(readings) // most)
+    return readings if step <= 1 else readings.where(np.arange(len(readings)) % step == 0)
 
 
 def _list_compasses(recording: Recording) -> str:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from magcomp import autopilots
-from magcomp.align import controls, expected_earth, has_position, readings, reported
+from magcomp.align import controls, expected_earth, has_position, readings, reported, thinned
 from magcomp.align.health import compass_complaints, current_complaints
 from magcomp.analysis.choose import with_speed_controllers
 from magcomp.analysis.emit import Emission, emit
@@ -190,7 +190,7 @@ def check(recording: Recording, options: Options | None = None) -> Mapping[int, 
     by_kind = reported(found)
     verdicts = {}
     for compass in compasses:
-        new = readings(recording, compass, start=wanted.start, end=wanted.end)
+        new = thinned(readings(recording, compass, start=wanted.start, end=wanted.end))
         kind = new.in_force[-1].regressor or found[0].kind
         if kind not in by_kind:
             raise MissingDataError(
@@ -232,7 +232,7 @@ def _one(
     in_force: Mapping[str, Control],
     earth: EarthField,
 ) -> _Judged:
-    new = readings(recording, compass, start=wanted.start, end=wanted.end)
+    new = thinned(readings(recording, compass, start=wanted.start, end=wanted.end))
     require_readings(new)
     with solvable(compass):
         problem = best_form([Problem(new, form, in_force, earth) for form in forms])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from synthetic import EXACT, Flown, problem_of
 
-from magcomp.align import controls, readings, reported, sample
+from magcomp.align import controls, readings, reported, sample, thinned
 from magcomp.autopilots import ardupilot
 from magcomp.errors import MissingDataError, UsageError
 from magcomp.model import Lags, ParameterChange, ParameterHistory, Recording, Series
@@ -136,6 +136,15 @@ def test_a_time_without_readings_says_so(recording):
     silent = with_field(recording, field.time[late], field.value[late])
     with pytest.raises(MissingDataError, match=f"none of its {late.sum()} is in that time"):
         readings(silent, 1, end=20.0)
+
+
+def test_a_log_of_hours_is_thinned_evenly_and_a_short_one_is_not(recording):
+    every = readings(recording, 1)
+    some = thinned(every, 100)
+    assert thinned(every, len(every)) is every
+    assert 50 < len(some) <= 100
+    assert np.array_equal(some.time, every.time[:: -(-len(every) // 100)])
+    assert some.attitude is every.attitude
 
 
 # --- what is missing is named ----------------------------------------------------------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -108,6 +109,16 @@ def test_it_prints_and_is_itself_again_afterwards(shown: Page, good: Path) -> No
     assert printed.startswith(b"%PDF")
     shown.wait_for(f"{width} === {before}")
     assert_clean(shown, good)
+
+
+def test_three_compasses_print_on_five_pages(browser: Page, tmp_path: Path) -> None:
+    made = still()
+    path = tmp_path / "three.html"
+    path.write_text(html(made.recording, made.analysis), encoding="utf-8")
+    assert len(made.analysis.compasses) == 3
+    show(browser, path)
+    printed = base64.b64decode(browser.call("Page.printToPDF")["data"])
+    assert 1 <= len(re.findall(rb"/Type\s*/Page\b", printed)) <= 5
 
 
 def test_a_phone_shows_a_rejected_fit_without_scrolling_sideways(browser: Page, bad: Path) -> None:
