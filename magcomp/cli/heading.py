@@ -223,7 +223,8 @@ def _text(found: _Answer) -> str:
         "",
         f" {printable(found.recording.source)}, compass {made.compass}",
         f" corrected by {printable(found.origin)}, {by}; "
-        f"the field is {1000 * made.field_lag_s:.0f} ms late, declination {math.degrees(made.declination):+.1f}°",
+        f"the field is {1000 * made.field_lag_s:.0f} ms late, "
+        f"declination {math.degrees(made.declination):+.1f}°",
         "",
         "".join([f" {'time, s':>9}", *(f"{name:>13}" for name in headings)]),
     ]
