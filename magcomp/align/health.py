@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from magcomp import autopilots
 from magcomp.model import FloatArray, Recording, Series
 
 _FROZEN_S = 5.0
@@ -31,6 +32,23 @@ def compass_complaints(recording: Recording, compass: int) -> tuple[str, ...]:
         return ()
     found = (_frozen(reported), _silent(reported, recording), _wild(reported))
     return tuple(f"compass {compass} {complaint}" for complaint in found if complaint)
+
+
+def vehicle_complaints(recording: Recording) -> tuple[str, ...]:
+    """The same for the vehicle: whether it has the same compasses from the beginning to the end."""
+    history = recording.parameters
+    first = {name: history.of(name)[0].value for name in history.names}
+    autopilot = autopilots.of(recording)
+    before = {each.slot: each.device_id for each in autopilot.compasses(first)}
+    for each in autopilot.compasses(history.latest):
+        known = before.get(each.slot, 0)
+        if known and each.device_id and known != each.device_id:
+            return (
+                f"the compass of slot {each.slot} has device id {known} first and "
+                f"{each.device_id} later: the log holds two aircraft, or a compass was exchanged; "
+                "fit each part by itself",
+            )
+    return ()
 
 
 def current_complaints(recording: Recording) -> tuple[str, ...]:

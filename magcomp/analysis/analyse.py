@@ -9,7 +9,7 @@ import numpy as np
 
 from magcomp import autopilots
 from magcomp.align import controls, expected_earth, has_position, readings, reported, thinned
-from magcomp.align.health import compass_complaints, current_complaints
+from magcomp.align.health import compass_complaints, current_complaints, vehicle_complaints
 from magcomp.analysis.choose import with_speed_controllers
 from magcomp.analysis.emit import Emission, emit
 from magcomp.analysis.multiplied import kinds_to_try, multiplied_notes, why_only_to_look_at
@@ -249,7 +249,7 @@ def _bounds(verdict: Verdict) -> list[float]:
 
 def _complaints(recording: Recording, compass: int, kind: str) -> tuple[str, ...]:
     """What is wrong with the sensors that an answer by a control quantity rests on."""
-    of_compass = compass_complaints(recording, compass)
+    of_compass = compass_complaints(recording, compass) + vehicle_complaints(recording)
     return of_compass + current_complaints(recording) if kind == CURRENT else of_compass
 
 

@@ -25,6 +25,7 @@ from magcomp.errors import ExitCode, MissingDataError, ParameterFileError, Usage
 from magcomp.experiments.motion import HeadingAccuracy, accuracy, heading_errors
 from magcomp.geometry import wrap_angle
 from magcomp.model import FloatArray, Grade, InForce, Recording, Series
+from magcomp.report.words import printable
 from magcomp.sources.truth import Truth, read_truth
 from magcomp.writing.files import read_parameter_file
 
@@ -220,8 +221,9 @@ def _text(found: _Answer) -> str:
     by = "no motor correction" if found.regressor is None else f"against {found.regressor}"
     lines = [
         "",
-        f" {found.recording.source}, compass {made.compass}",
-        f" corrected by {found.origin}, {by}; the field is {1000 * made.field_lag_s:.0f} ms late, "
+        f" {printable(found.recording.source)}, compass {made.compass}",
+        f" corrected by {printable(found.origin)}, {by}; "
+        f"the field is {1000 * made.field_lag_s:.0f} ms late, "
         f"declination {math.degrees(made.declination):+.1f}°",
         "",
         "".join([f" {'time, s':>9}", *(f"{name:>13}" for name in headings)]),

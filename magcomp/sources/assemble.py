@@ -27,7 +27,7 @@ from magcomp.sources.clock import (
 from magcomp.sources.quantities import Messages, Timed
 from magcomp.sources.repeats import repeated
 from magcomp.sources.source import is_text
-from magcomp.sources.vehicles import ONLY_ONE, Choice, choose
+from magcomp.sources.vehicles import ONLY_ONE, Choice, choose, require_one_clock
 
 Buffer = bytes | bytearray | memoryview | ByteArray
 
@@ -143,6 +143,8 @@ def decode_vehicle(
         tables = {message: tables[message][~copies[rows[message]]] for message in rows}
         frames, stamp = frames[~copies], stamp[~copies]
         rows = _rows(frames)
+    if Message.ATTITUDE in rows:
+        require_one_clock(source, stamp[rows[Message.ATTITUDE]])
     axis = _axis(frames, stamp, rows)
     core = np.ones(len(frames), dtype=bool)
     for message in rows.keys() - WANTED:

@@ -9,6 +9,7 @@ import numpy as np
 
 from magcomp import autopilots
 from magcomp.errors import ChooseVehicleError, LogError
+from magcomp.mavlink.checksum import OffsetArray
 from magcomp.mavlink.frames import Frames
 from magcomp.mavlink.heartbeat import Identity, identify, vehicles
 from magcomp.mavlink.messages import Table
@@ -29,6 +30,9 @@ class Choice:
     system: int | None = None
     component: int | None = None
 
+
+_CLOCKS_APART = 2_000_000
+_LEAST_TURNS, _TURNS_SHARE = 50, 0.05
 
 ONLY_ONE = Choice()
 """The only vehicle there is."""
@@ -77,6 +81,31 @@ def choose(source: str, heartbeats: Frames, table: Table, choice: Choice) -> Ide
             f"instead received {choice.system}."
         )
     return wanted[0]
+
+
+def require_one_clock(source: str, stamp: OffsetArray) -> None:
+    """Refuse two vehicles that speak under one number at the same time.
+
+    Parameters
+    ----------
+    source
+        Name of the log, for messages.
+    stamp
+        Time since boot in microseconds of messages of one kind as they came, shape (n,).
+
+    Raises
+    ------
+    ChooseVehicleError
+        The time goes back and forth all the time, as only two clocks do.
+    """
+    step = np.diff(stamp[stamp >= 0])
+    turns = min(np.count_nonzero(step < -_CLOCKS_APART), np.count_nonzero(step > _CLOCKS_APART))
+    if turns >= _LEAST_TURNS and turns > _TURNS_SHARE * len(step):
+        raise ChooseVehicleError(
+            f"Log {source} must hold one vehicle under a system number; instead two clocks take "
+            f"turns {turns} times, so two vehicles speak with the same one: give each a number of "
+            "its own and record again."
+        )
 
 
 def _identities(heartbeats: Frames, table: Table) -> tuple[Identity, ...]:

@@ -9,8 +9,8 @@ import pytest
 import truth
 from synthetic import Flown
 
-from magcomp.align.health import compass_complaints, current_complaints
-from magcomp.model import Recording, Series
+from magcomp.align.health import compass_complaints, current_complaints, vehicle_complaints
+from magcomp.model import ParameterChange, ParameterHistory, Recording, Series
 from magcomp.sources import read
 
 FIXTURES = (
@@ -98,3 +98,12 @@ def test_a_compass_that_glitches_is_named(sound):
 def test_a_battery_monitor_that_fails_is_named(sound, change, word):
     (complaint,) = current_complaints(with_current(sound, change))
     assert word in complaint
+
+
+def test_compasses_that_become_others_are_two_aircraft() -> None:
+    ids = (ParameterChange(0.0, "COMPASS_DEV_ID", 97539.0),)
+    other = (*ids, ParameterChange(30.0, "COMPASS_DEV_ID", 97540.0))
+    flown = Flown(seconds=20.0).recording()
+    assert vehicle_complaints(replace(flown, parameters=ParameterHistory(ids))) == ()
+    (said,) = vehicle_complaints(replace(flown, parameters=ParameterHistory(other)))
+    assert "two aircraft" in said

@@ -97,6 +97,13 @@ def test_a_gyro_that_is_hardly_told_gives_no_fused_heading(tmp_path, capsys):
     assert "should not have happened" not in capsys.readouterr().err
 
 
+def test_a_file_name_cannot_colour_the_terminal(tmp_path, capsys):
+    log = tmp_path / "a\x1b[31mb.tlog"
+    log.write_bytes(SWEEP.read_bytes())
+    assert run(["heading", str(log), "--in-force"]) == 0
+    assert "a?[31mb.tlog" in capsys.readouterr().out
+
+
 def test_the_text_tells_the_error_and_the_plot_draws_it(capsys):
     assert run(["heading", FLIGHT, "--plot"]) == 0
     text = capsys.readouterr().out

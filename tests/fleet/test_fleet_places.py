@@ -22,13 +22,18 @@ class Quiet(SimpleHTTPRequestHandler):
         """Say nothing."""
 
 
+class Server(ThreadingHTTPServer):
+    def handle_error(self, request: object, client_address: object) -> None:
+        """Say nothing of a client that has what it wanted and hangs up."""
+
+
 @pytest.fixture
 def server(tmp_path: Path) -> Iterator[str]:
     """A web server with what is named as a log."""
     (tmp_path / "a.tlog").write_bytes(bytes(range(256)) * 5000)
     (tmp_path / "b.bin").write_bytes(b"nothing")
     (tmp_path / "c.txt").write_text("not a log")
-    web = ThreadingHTTPServer(("127.0.0.1", 0), partial(Quiet, directory=str(tmp_path)))
+    web = Server(("127.0.0.1", 0), partial(Quiet, directory=str(tmp_path)))
     thread = threading.Thread(target=web.serve_forever, kwargs={"poll_interval": 0.01})
     thread.start()
     yield f"http://127.0.0.1:{web.server_address[1]}"

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tlog_writer import SECOND, START_US, Sender, log, record
 
+from magcomp.errors import ChooseVehicleError
 from magcomp.model import Recording, Series
 from magcomp.sources.assemble import recording_from_bytes
 
@@ -115,6 +116,15 @@ def test_a_leap_of_the_vehicles_clock_takes_no_longer_than_the_recorder_waited()
     recording = read(log(frames, lambda n: n * 50_000))
     assert np.diff(attitude(recording).time) == pytest.approx(0.1)
     assert recording.field[1].time == pytest.approx(attitude(recording).time, abs=0.1)
+
+
+def test_two_vehicles_that_speak_with_one_number_are_named() -> None:
+    sender = Sender()
+    frames = [sender.heartbeat()]
+    for n in range(200):
+        frames += [sender.attitude(5_000 + 100 * n), sender.attitude(82_000 + 100 * n)]
+    with pytest.raises(ChooseVehicleError, match="two vehicles speak with the same one"):
+        read(log(frames, lambda n: n * 50_000))
 
 
 def test_an_hour_without_a_link_stays_an_hour() -> None:
