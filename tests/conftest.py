@@ -4,7 +4,13 @@ from __future__ import annotations
 
 import sys
 
+import os
+
 from hypothesis import settings
+
+# The matrices of a fit are small: more threads only wait for each other. Set before numpy is
+# loaded; programs that tests start inherit it.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 # A busy machine is slow, not wrong: no test here is about the time of one example.
 settings.register_profile("magcomp", deadline=None)

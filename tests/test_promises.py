@@ -29,7 +29,7 @@ PROMISED_DEG = {
     "turntable_five_levels": 0.2,
     "flight": 0.4,
     "flight.BIN": 0.4,
-    "flight_wrong_mot": 0.65,
+    "flight_wrong_mot": 0.45,
     "flight_low_rate": 0.6,
     "flight_uncalibrated": 1.0,
 }

@@ -10,7 +10,7 @@ band, so it costs linear time (docs/method.md, Flights).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,12 +25,16 @@ STATES = 6
 
 LEAST_STRETCH_S, MOST_STRETCHES = 1.0, 400
 
-_TILT_DEG = (0.02, 0.05, 0.1, 0.2, 0.35, 0.6, 1.0)
-_TILT_S = (3.0, 10.0, 30.0, 100.0)
-_DRIFT_MGAUSS = (0.2, 0.6, 1.5, 3.0, 6.0, 12.0)
-_DRIFT_S = (20.0, 60.0, 200.0)
-_CONTROL_SHARE = (0.001, 0.01, 0.03, 0.08, 0.15)
-_CONTROL_S = (1.0, 3.0, 10.0, 40.0)
+_TRIED: Mapping[str, tuple[float, ...]] = {
+    "control_share": (0.001, 0.01, 0.03, 0.08, 0.15),
+    "control_s": (1.0, 3.0, 10.0, 40.0),
+    "tilt_rad": tuple(np.radians((0.02, 0.05, 0.1, 0.2, 0.35, 0.6, 1.0)).tolist()),
+    "tilt_s": (3.0, 10.0, 30.0, 100.0),
+    "drift_mgauss": (0.2, 0.6, 1.5, 3.0, 6.0, 12.0),
+    "drift_s": (20.0, 60.0, 200.0),
+}
+_ROUNDS = 8
+_NEGLIGIBLE = 0.5
 _LEAST_TILT_RAD, _LEAST_DRIFT_MGAUSS = np.radians(0.12), 0.5
 _LOSS_SCALE = 4.0
 _STEPS = 4
@@ -62,14 +66,12 @@ class Wander:
         """Whether there is any to speak of."""
         return self.tilt_rad > _LEAST_TILT_RAD or self.drift_mgauss > _LEAST_DRIFT_MGAUSS
 
-    def neighbours(self) -> Iterable[Wander]:
-        """The same with one number at each of the values tried."""
-        yield from (replace(self, control_share=value) for value in _CONTROL_SHARE)
-        yield from (replace(self, control_s=value) for value in _CONTROL_S)
-        yield from (replace(self, tilt_rad=float(np.radians(value))) for value in _TILT_DEG)
-        yield from (replace(self, tilt_s=value) for value in _TILT_S)
-        yield from (replace(self, drift_mgauss=value) for value in _DRIFT_MGAUSS)
-        yield from (replace(self, drift_s=value) for value in _DRIFT_S)
+    def neighbours(self) -> Iterator[Wander]:
+        """The same with one number at the next smaller or larger of the values tried."""
+        for name, values in _TRIED.items():
+            place = values.index(getattr(self, name))
+            for value in values[max(place - 1, 0) : place + 2]:
+                yield replace(self, **{name: value})
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,17 +219,22 @@ class Posterior:
 
 
 def likeliest(part: Reduced, prior: Prior, at: FloatArray) -> Wander:
-    """The processes that make the residuals likeliest, by coordinates in turn."""
-    best = Wander()
-    score = -np.inf
-    for _ in range(4):
-        before = score
-        for tried in best.neighbours():
+    """The processes that make the residuals likeliest, climbed to by one number at a time."""
+    scores: dict[Wander, float] = {}
+
+    def score(tried: Wander) -> float:
+        if tried not in scores:
             information, loss = marginal(part, tried)
-            value = _posterior(information, loss, prior, at, tried).evidence
-            if value > score:
-                best, score = tried, value
-        if score - before < 0.5:
+            scores[tried] = _posterior(information, loss, prior, at, tried).evidence
+        return scores[tried]
+
+    best = Wander()
+    for _ in range(_ROUNDS):
+        before = score(best)
+        for tried in best.neighbours():
+            if score(tried) > score(best):
+                best = tried
+        if score(best) - before < _NEGLIGIBLE:
             break
     return best
 
