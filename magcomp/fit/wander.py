@@ -14,7 +14,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import cho_solve_banded, cholesky_banded
 
 from magcomp.fit.field_model import SIZE, TILT
 from magcomp.fit.robust import Prior
@@ -165,6 +164,9 @@ def marginal(part: Reduced, wander: Wander) -> tuple[FloatArray, float]:
     float
         −½ log det of what the states' precision gained: what the likelihood loses to them.
     """
+    # SciPy takes a second to import: only where there is something to fit.
+    from scipy.linalg import cho_solve_banded, cholesky_banded  # noqa: PLC0415
+
     band, prior_log_det = _prior_band(part.time, wander)
     size = len(part.time) * STATES
     for row in range(STATES):

@@ -90,7 +90,7 @@ def test_a_poor_flight_leans_on_the_calibration_in_force(seed):
     """Hardly tilted, hardly turned: strength and dip alone cannot tell the offsets."""
     found = fit(Flown(seed=seed, seconds=40.0, tilt=0.03, noise=3.0).problem(), "flight")
     assert np.linalg.norm(found.correction.offset - EXACT.offset) < 3 * TRUSTED_OFFSET_MGAUSS
-    assert np.allclose(found.correction.soft_iron, EXACT.soft_iron, atol=1e-5)
+    assert np.allclose(found.correction.soft_iron, EXACT.soft_iron, atol=TRUSTED_SOFT_IRON)
 
 
 # --- the model's derivatives -----------------------------------------------------------------
