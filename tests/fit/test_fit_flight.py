@@ -13,7 +13,7 @@ from magcomp.earth import EarthField
 from magcomp.errors import FitRejectedError, MissingDataError, UsageError
 from magcomp.fit import Problem, fit
 from magcomp.fit.field_model import SIZE, lags_of, strength_and_dip
-from magcomp.fit.flight import TRUSTED_OFFSET_MGAUSS, is_physical, prior
+from magcomp.fit.flight import TRUSTED_OFFSET_MGAUSS, TRUSTED_SOFT_IRON, is_physical, prior
 from magcomp.model import MotorFit, Series, pack
 
 NOTHING = {
