@@ -39,6 +39,10 @@ UNSEEN = 1.25
 sensor's scale that drifts with it, a lag that is not one number, wires that share unequally.
 benchmarks/coverage.py counts how often the bounds hold on simulated vehicles."""
 
+FLOOR_THROTTLE = 0.05
+"""The current is no straight line in the throttle: by this share of the motor vector a flight's fit
+may be off at the top, and by half of it in the other direction at rest."""
+
 FLOOR_MOTOR, FLOOR_OFFSET_MGAUSS, FLOOR_SOFT_IRON = 0.005, 0.3, 0.001
 """What no residual shows: a share of the motor vector for wires that share unequally and current
 sensors that are not straight, and what temperature moves of offsets and scale."""
@@ -125,6 +129,10 @@ def _widened(fit: MotorFit, motors: FloatArray) -> MotorFit:
     floor = np.full(CORRECTION_SIZE, FLOOR_SOFT_IRON)
     floor[MOTOR] = FLOOR_MOTOR * np.linalg.norm(fit.correction.motor)
     floor[OFFSET] = FLOOR_OFFSET_MGAUSS
+    if fit.regressor != CURRENT and fit.method == "flight":
+        at_top = FLOOR_THROTTLE * float(np.linalg.norm(fit.correction.motor))
+        floor[MOTOR] = at_top
+        floor[OFFSET] = np.hypot(FLOOR_OFFSET_MGAUSS, at_top * fit.u_high / 2.0)
     return replace(fit, covariance=fit.covariance * np.outer(scale, scale) + np.diag(floor**2))
 
 

@@ -198,6 +198,14 @@ def test_a_throttle_that_hardly_changed_asks_for_climbs_and_descents():
     assert "the throttle only ranged from" in said(verdict)
 
 
+def test_a_flight_by_throttle_is_no_surer_than_the_bend_of_the_current_allows():
+    fit, _ = judged(by_throttle(0.2, 0.6))
+    assert fit.method == "flight"
+    std = np.sqrt(np.diag(fit.covariance))
+    assert np.all(std[:3] >= 0.05 * np.linalg.norm(fit.correction.motor))
+    assert np.all(std[3:6] >= 0.025 * np.linalg.norm(fit.correction.motor) * fit.u_high)
+
+
 def test_a_current_that_hardly_changed_asks_for_climbs_and_descents():
     _, verdict = judged(Flown(seed=1, swing=0.8, slow_s=60.0).recording())
     assert verdict.grade is not Grade.GOOD
