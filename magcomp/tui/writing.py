@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Protocol
 
 from magcomp.errors import MagcompError
 from magcomp.model import Grade
@@ -63,21 +64,36 @@ def ask_save(app: BaseApp, proposed: str = "") -> None:
         f"Its end chooses its form: {words.listed(SUFFIXES)}.",
         (("File", proposed or str(_proposed(app.work, ".param"))),),
     )
-    app.push_screen(dialog, lambda answer: _save(app, answer[0]) if answer else None)
+    _ask_file(app, dialog, _save_now)
 
 
-def _proposed(work: Work, suffix: str) -> Path:
-    return Path(f"compass{suffix}") if work.live else Path(work.source).with_suffix(suffix)
+class _Save(Protocol):
+    def __call__(self, app: BaseApp, path: Path, *, force: bool) -> None: ...
 
 
-def _save(app: BaseApp, text: str) -> None:
+def _ask_file(app: BaseApp, dialog: AskText, save: _Save) -> None:
+    """Save to the file that the dialog asks for."""
+
+    def answered(answer: Sequence[str] | None) -> None:
+        if answer:
+            _to_file(app, answer[0], save)
+
+    app.push_screen(dialog, answered)
+
+
+def _to_file(app: BaseApp, text: str, save: _Save) -> None:
+    """Save to the file named, after a question where it exists."""
     path = Path(text).expanduser()
     if path.is_file():
         question = f"{path} exists already. Overwrite it?"
         dialog = Confirm("Overwrite?", question, yes="Overwrite", no="Keep")
-        app.push_screen(dialog, lambda sure: _save_now(app, path, force=True) if sure else None)
+        app.push_screen(dialog, lambda sure: save(app, path, force=True) if sure else None)
     else:
-        _save_now(app, path, force=False)
+        save(app, path, force=False)
+
+
+def _proposed(work: Work, suffix: str) -> Path:
+    return Path(f"compass{suffix}") if work.live else Path(work.source).with_suffix(suffix)
 
 
 def _save_now(app: BaseApp, path: Path, *, force: bool) -> None:
@@ -105,17 +121,9 @@ def ask_report(app: BaseApp, proposed: str = "") -> None:
         f"Its end chooses its form: {words.listed(REPORT_SUFFIXES)}.",
         (("File", proposed or str(_proposed(app.work, ".html"))),),
     )
-    app.push_screen(dialog, lambda answer: _save_report(app, answer[0]) if answer else None)
-
-
-def _save_report(app: BaseApp, text: str) -> None:
-    path = Path(text).expanduser()
-    if path.is_file():
-        question = f"{path} exists already. Overwrite it?"
-        dialog = Confirm("Overwrite?", question, yes="Overwrite", no="Keep")
-        app.push_screen(dialog, lambda sure: _make_report(app, path, force=True) if sure else None)
-    else:
-        _make_report(app, path, force=False)
+    app.push_screen(
+        dialog, lambda answer: _to_file(app, answer[0], _make_report) if answer else None
+    )
 
 
 def _make_report(app: BaseApp, path: Path, *, force: bool) -> None:
