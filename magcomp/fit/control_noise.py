@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from magcomp.fit.robust import NOISE_FLOOR, spread_of
 from magcomp.model import FloatArray
 
 MOST_SHARE = 0.25
@@ -85,7 +86,7 @@ def noise_of(values: FloatArray, pulls: FloatArray, spread_u: float) -> Noise | 
     Expectation maximisation with the error of u as the hidden factor; readings far out count
     less.
     """
-    sensor = np.maximum(1.4826 * np.median(np.abs(values), axis=0), 0.2)
+    sensor = spread_of(values)
     signal = float(np.median(np.linalg.norm(pulls, axis=1))) * spread_u
     if signal < _LEAST_SIGNAL * float(np.linalg.norm(sensor)):
         return None
@@ -101,7 +102,7 @@ def noise_of(values: FloatArray, pulls: FloatArray, spread_u: float) -> Noise | 
         control = float(np.sqrt(weight @ (error**2 + 1.0 / precision)))
         spread = weight @ (left**2 + pulls**2 / precision[:, None])
         before = noise.control
-        noise = Noise(np.maximum(np.sqrt(spread), 0.2), float(np.clip(control, 1e-3, most)))
+        noise = Noise(np.maximum(np.sqrt(spread), NOISE_FLOOR), float(np.clip(control, 1e-3, most)))
         if abs(noise.control / before - 1.0) < _SETTLED:
             break
     return noise

@@ -45,7 +45,6 @@ from magcomp.fit.robust import (
     one_step,
     recorded_time,
     solve,
-    spread_of,
     time_blocks,
 )
 from magcomp.fit.wander import Posterior, Rows, mixed, posterior
@@ -269,12 +268,8 @@ def near(problem: Problem, free: int, start: FloatArray) -> FloatArray:
         What all readings gave, shape (SIZE,); its lags are kept.
     """
     samples = problem.sample(lags_of(start))
-    errors = errors_of(samples, start)
-    values, _ = strength_and_dip(samples, start, errors)
-    known = _with_lags_held(prior(problem, free))
-    return one_step(
-        lambda p: strength_and_dip(samples, p, errors), start, known, spread_of(values, 0.2)
-    )
+    values, slopes = strength_and_dip(samples, start, errors_of(samples, start))
+    return one_step(values, slopes, start, _with_lags_held(prior(problem, free)))
 
 
 def with_wander(problem: Problem, found: FlightEstimate, free: int) -> tuple[FlightEstimate, int]:

@@ -25,6 +25,9 @@ ROUNDS = 6
 LOSS_SCALE = 2.0
 """Residuals beyond this many σ count linearly."""
 
+NOISE_FLOOR = 0.2
+"""mGauss: readings are rounded to whole ones, so no σ is less."""
+
 _MAD_TO_STD = 1.4826
 _STEPS = 12
 _DAMPING_START = 1e-6
@@ -89,7 +92,7 @@ def solve(
     *,
     blocks: IntArray | None = None,
     doubt: Prior | None = None,
-    noise_floor: float = 0.2,
+    noise_floor: float = NOISE_FLOOR,
     noise: FloatArray | None = None,
     rounds: int = ROUNDS,
     feasible: Callable[[FloatArray], bool] = lambda _: True,
@@ -155,21 +158,24 @@ def solve(
 
 
 def one_step(
-    residuals: Residuals, start: FloatArray, prior: Prior, scale: FloatArray
+    values: FloatArray,
+    slopes: FloatArray,
+    start: FloatArray,
+    prior: Prior,
 ) -> FloatArray:
     """The parameters after a single Gauss–Newton step from a point near the solution.
 
     Parameters
     ----------
-    residuals, prior
-        As for :func:`solve`.
+    values, slopes
+        Residuals at ``start``, shape (n, g), and their derivatives, shape (n, g, k).
     start
         Near the solution, shape (k,).
-    scale
-        σ of each kind of residual, shape (g,).
+    prior
+        As for :func:`solve`.
     """
     moving = prior.width > 0.0
-    values, slopes = residuals(start)
+    scale = spread_of(values)
     weights = _weights(values / scale) / scale**2
     design = _columns(slopes, moving).reshape(-1, int(moving.sum()))
     weighted = design * weights.reshape(-1, 1)
@@ -185,7 +191,7 @@ def _columns(slopes: FloatArray, moving: BoolArray) -> FloatArray:
     return slopes if moving.all() else slopes[:, :, moving]
 
 
-def spread_of(values: FloatArray, floor: float) -> FloatArray:
+def spread_of(values: FloatArray, floor: float = NOISE_FLOOR) -> FloatArray:
     """Robust σ of each kind of residual, shape (g,), and at least the rounding of the readings.
 
     Examples

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from magcomp.fit.field_model import SIZE, TILT
-from magcomp.fit.robust import Prior
+from magcomp.fit.robust import Prior, spread_of
 from magcomp.model import OFFSET, FloatArray, IntArray
 
 STATES = 6
@@ -301,8 +301,8 @@ def posterior(
 def _weights(time: FloatArray, values: FloatArray) -> FloatArray:
     """One over the variance of each residual: white noise from neighbours, outliers less."""
     close = np.diff(time) < 2.0
-    steps = np.abs(np.diff(values, axis=0)[close]) if close.any() else np.abs(values)
-    white = np.maximum(1.4826 * np.median(steps, axis=0) / np.sqrt(2.0), 0.2)
+    steps = np.diff(values, axis=0)[close] if close.any() else values
+    white = spread_of(steps / np.sqrt(2.0))
     centre = np.stack([_running_median(column) for column in values.T], axis=1)
     far = (values - centre) / white
     return np.asarray(1.0 / (1.0 + (far / _LOSS_SCALE) ** 2) / white**2)

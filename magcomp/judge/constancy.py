@@ -22,7 +22,7 @@ from magcomp.fit.field_model import (
     strength_and_dip,
 )
 from magcomp.fit.flight import drift_blocks, prior
-from magcomp.fit.robust import time_blocks
+from magcomp.fit.robust import spread_of, time_blocks
 from magcomp.model import (
     CORRECTION_SIZE,
     MOTOR,
@@ -38,7 +38,6 @@ _SPLITS = (0.2, 0.35, 0.5, 0.65, 0.8)
 _LEAST_SIGMA = 3.5
 _BLOCK_S = 15.0
 _USUAL_DRIFT_MGAUSS = 3.0
-_MAD_TO_STD = 1.4826
 _WIDEST = 0.1
 
 
@@ -179,7 +178,7 @@ def departures_of(problem: Problem, fit: MotorFit, lags: Lags) -> tuple[Departur
 
 
 def _weighted(problem: Problem, values: FloatArray, slopes: FloatArray) -> _Linear:
-    spread = np.maximum(_MAD_TO_STD * np.median(np.abs(values), axis=0), 0.2)
+    spread = spread_of(values)
     weight = 1.0 / np.sqrt(1.0 + (values / spread / 2.0) ** 2)
     root = np.sqrt(weight) / spread
     known = prior(problem, 4).precision

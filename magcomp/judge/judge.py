@@ -126,14 +126,18 @@ def _widened(fit: MotorFit, motors: FloatArray) -> MotorFit:
     if fit.method == "sweep":
         # What a vehicle at rest cannot show does not scatter between its folds either.
         scale[MOTOR.stop :] = 1.0
+    widened = fit.covariance * np.outer(scale, scale) + np.diag(_floor(fit) ** 2)
+    return replace(fit, covariance=widened)
+
+
+def _floor(fit: MotorFit) -> FloatArray:
+    """Standard errors that no residual shows, of the 12 parameters."""
+    bent = fit.regressor != CURRENT and fit.method == "flight"
+    motor = (FLOOR_THROTTLE if bent else FLOOR_MOTOR) * float(np.linalg.norm(fit.correction.motor))
     floor = np.full(CORRECTION_SIZE, FLOOR_SOFT_IRON)
-    floor[MOTOR] = FLOOR_MOTOR * np.linalg.norm(fit.correction.motor)
-    floor[OFFSET] = FLOOR_OFFSET_MGAUSS
-    if fit.regressor != CURRENT and fit.method == "flight":
-        at_top = FLOOR_THROTTLE * float(np.linalg.norm(fit.correction.motor))
-        floor[MOTOR] = at_top
-        floor[OFFSET] = np.hypot(FLOOR_OFFSET_MGAUSS, at_top * fit.u_high / 2.0)
-    return replace(fit, covariance=fit.covariance * np.outer(scale, scale) + np.diag(floor**2))
+    floor[MOTOR] = motor
+    floor[OFFSET] = np.hypot(FLOOR_OFFSET_MGAUSS, motor * fit.u_high / 2.0 if bent else 0.0)
+    return floor
 
 
 def _present_control(problem: Problem, samples: Samples, fit: MotorFit) -> FloatArray:
@@ -154,11 +158,12 @@ def _findings(
     covered: Coverage,
     limits: Thresholds,
 ) -> Iterator[Finding]:
-    known = _worst_flown(fit, errors).p95 <= limits.marginal_deg
+    worst = _worst_flown(fit, errors)
+    known = worst.p95 <= limits.marginal_deg
     yield from on_control(fit.regressor, covered, limits, known=known)
     yield from _on_unseen(fit, errors, residual, limits)
-    yield from _on_bound(fit, errors, limits)
-    yield from _on_shape(fit, errors, residual, covered, limits)
+    yield from _on_bound(fit, errors, worst, limits)
+    yield from _on_shape(fit, residual, covered, limits, known=known)
 
 
 def _on_unseen(
@@ -192,9 +197,8 @@ def _fall(residual: FieldResidual) -> float:
 
 
 def _on_bound(
-    fit: MotorFit, errors: tuple[HeadingError, ...], limits: Thresholds
+    fit: MotorFit, errors: tuple[HeadingError, ...], worst: HeadingError, limits: Thresholds
 ) -> Iterator[Finding]:
-    worst = _worst_flown(fit, errors)
     if worst.p95 <= limits.good_deg:
         return
     tolerable = max(limits.marginal_deg, limits.lesser_evil * worst.before)
@@ -228,13 +232,13 @@ def _of_motors(rest: HeadingError, top: HeadingError) -> float:
 
 def _on_shape(
     fit: MotorFit,
-    errors: tuple[HeadingError, ...],
     residual: FieldResidual,
     covered: Coverage,
     limits: Thresholds,
+    *,
+    known: bool,
 ) -> Iterator[Finding]:
     if fit.method == "flight":
-        known = _worst_flown(fit, errors).p95 <= limits.marginal_deg
         yield from on_turn(covered, limits, known=known)
     if residual.held_out > limits.noise_share * fit.strength:
         yield Finding(
