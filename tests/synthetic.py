@@ -2,18 +2,21 @@
 
 Unlike magcomp.simulate there is no autopilot and no physics here, only the
 model the fits assume, so a fit that misses its numbers is wrong and nothing else.
+
+What ArduPilot calls its parameters and does with them is written out here by hand
+(docs/autopilots.md, ArduPilot: correction) and not taken from the code under test.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from magcomp.align import controls, readings, reported
-from magcomp.autopilots import ardupilot
 from magcomp.earth import EarthField, expected_field
 from magcomp.fit import Problem
 from magcomp.geometry import body_from_earth
@@ -56,6 +59,39 @@ def waves(rng: np.random.Generator, time: FloatArray, slow: float, fast: float) 
     return np.asarray(np.sin(2 * np.pi * np.multiply.outer(time, 1 / period) + phase).sum(1) / 2.0)
 
 
+def stored(correction: Correction, compass: int = 1) -> dict[str, float]:
+    """A correction as ArduPilot's parameters, each the float32 it keeps."""
+    number = "" if compass == 1 else str(compass)
+    iron = correction.soft_iron
+    vectors = {
+        "OFS": correction.offset,
+        "DIA": np.diag(iron),
+        "ODI": iron[(0, 0, 1), (1, 2, 2)],
+        "MOT": correction.motor,
+    }
+    return {
+        f"COMPASS_{kind}{number}_{axis}": float(np.float32(value))
+        for kind, vector in vectors.items()
+        for axis, value in zip("XYZ", vector, strict=True)
+    }
+
+
+def as_ardupilot(
+    values: Mapping[str, float], compass: int, raw: FloatArray, amperes: FloatArray
+) -> FloatArray:
+    """ArduPilot's correction of a sensor field, mGauss, shape (n, 3)."""
+    number = "" if compass == 1 else str(compass)
+
+    def vector(kind: str, default: float = 0.0) -> FloatArray:
+        names = (f"COMPASS_{kind}{number}_{axis}" for axis in "XYZ")
+        return np.array([values.get(name, default) for name in names])
+
+    (x, y, z), (xy, xz, yz) = vector("DIA", 1.0), vector("ODI")
+    soft_iron = np.array([[x, xy, xz], [xy, y, yz], [xz, yz, z]])
+    motor = vector("MOT") if values.get("COMPASS_MOTCT") in (1.0, 2.0) else np.zeros(3)
+    return (raw + vector("OFS")) @ soft_iron + np.multiply.outer(amperes, motor)
+
+
 @dataclass(frozen=True)
 class Flown:
     """How a recording is made.
@@ -88,7 +124,6 @@ class Flown:
     fast_s: float = 2.5
     current_hz: float = 10.0
     compasses: tuple[int, ...] = (1,)
-    extra: Mapping[str, float] = field(default_factory=dict)
 
     def current_at(self, time: FloatArray) -> FloatArray:
         """The true current, A."""
@@ -119,11 +154,21 @@ class Flown:
         """What was in force at the start."""
         if self.in_force is not None:
             return dict(self.in_force)
-        values: dict[str, float] = {ardupilot.COMPENSATION_SWITCH: 0.0}
+        values: dict[str, float] = {"COMPASS_MOTCT": 0.0}
         for compass in self.compasses:
-            unmoved = replace(self.exact, motor=np.zeros(3))
-            values |= ardupilot.correction_parameters(unmoved, compass, 1.0)
+            values |= stored(replace(self.exact, motor=np.zeros(3)), compass)
         return values
+
+    def corrected(self, time: FloatArray, raw: FloatArray, compass: int) -> FloatArray:
+        """What the autopilot makes of a sensor field, mGauss, shape (n, 3)."""
+        now = self.current_at(time - self.current_lag - APPLIED_LATER_S)
+        corrected = np.empty_like(raw)
+        edges = [-np.inf, *sorted({change.time for change in self.changed}), np.inf]
+        for begin, end in pairwise(edges):
+            rows = (time >= begin) & (time < end)
+            values = self.parameters() | {c.name: c.value for c in self.changed if c.time <= begin}
+            corrected[rows] = as_ardupilot(values, compass, raw[rows], now[rows])
+        return corrected
 
     def recording(self) -> Recording:
         """What the autopilot would have reported."""
@@ -139,11 +184,7 @@ class Flown:
         for compass in self.compasses:
             raw = self.sensed_at(time - self.field_lag, compass)
             raw = raw + rng.normal(scale=self.noise, size=raw.shape)
-            now = self.current_at(time - self.current_lag - APPLIED_LATER_S)
-            reported_field = np.empty_like(raw)
-            for index, moment in enumerate(time):
-                calibration = ardupilot.calibration_at(history, compass, float(moment))
-                reported_field[index] = ardupilot.correct(raw[index], now[index], calibration)
+            reported_field = self.corrected(time, raw, compass)
             if self.truncated:
                 reported_field = np.trunc(reported_field)
             fields[compass] = Series(time, reported_field)

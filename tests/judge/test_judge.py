@@ -15,11 +15,13 @@ from magcomp.errors import MissingDataError
 from magcomp.fit import fit, folds
 from magcomp.geometry import body_from_earth, heading, wrap_angle
 from magcomp.judge import evidence, heading_errors, judge, judge_present, largest_shift
+from magcomp.judge.present import _error as error_of_level
 from magcomp.model import (
     CORRECTION_SIZE,
     MOTOR,
     Correction,
     Grade,
+    Level,
     MotorFit,
     Recording,
     Series,
@@ -85,6 +87,19 @@ def test_a_field_that_only_memory_could_explain_is_not_explained_on_unseen_data(
     assert verdict.residual.held_out > 0.97 * verdict.residual.held_out_before
 
 
+def test_a_sweep_is_held_out_against_the_constant_of_what_it_saw():
+    """Whatever sets the unseen readings apart stays, by the fit and by what was in force."""
+    problem = Swept().problem()
+    found = fit(problem)
+    seen = problem.sample(evidence.used_lags(found))
+    moved = np.array([0.0, 30.0, 0.0])
+    unseen = replace(seen, raw=seen.raw + moved, present=seen.present + moved)
+    by_fit = np.median(evidence._left(found, seen, unseen), axis=0)
+    assert by_fit == pytest.approx(found.correction.soft_iron @ moved, abs=1e-6)
+    before = np.median(evidence._left_before(found, seen, unseen), axis=0)
+    assert before == pytest.approx(moved, abs=1e-6)
+
+
 # --- degrees -----------------------------------------------------------------------------------
 
 
@@ -112,6 +127,18 @@ def test_no_doubt_leaves_no_error_and_twice_the_doubt_twice_the_bound():
         assert one.after <= one.p95
         assert four.p95 == pytest.approx(2 * one.p95, rel=1e-6)
         assert four.before == one.before
+
+
+def test_the_bound_is_the_95_per_cent_quantile():
+    """Of one doubtful number: 1.960 standard errors, where the median is 0.674."""
+    found = fit(Flown(seed=1).problem(), "flight")
+    covariance = np.zeros((CORRECTION_SIZE,) * 2)
+    covariance[0, 0] = 1e-4
+    rng = np.random.default_rng(1)
+    one = replace(found, covariance=covariance)
+    rows = heading_errors(one, found.correction, np.arange(0.0, 60.0, 10.0), rng)[1:]
+    for row in rows:
+        assert row.p95 / row.after == pytest.approx(1.960 / 0.674, rel=0.12)
 
 
 def test_the_error_before_is_the_error_of_what_was_in_force_against_the_fit():
@@ -162,6 +189,13 @@ def test_the_covariance_is_widened_where_the_folds_disagree_by_more_than_it_says
     grown = np.diag(after.covariance)[MOTOR] / np.diag(boastful.covariance)[MOTOR]
     assert grown.min() > 100.0
     assert np.diag(honest.covariance)[MOTOR].max() < 10 * np.diag(found.covariance)[MOTOR].max()
+
+
+def test_a_quarter_of_the_doubt_is_added_for_what_is_alike_in_every_block():
+    problem = Flown(seed=4).problem()
+    found = fit(problem, "flight")
+    judged, _ = judge(problem, found)
+    assert np.all(np.diag(judged.covariance) >= 1.25**2 * np.diag(found.covariance))
 
 
 # --- words ---------------------------------------------------------------------------------------
@@ -294,6 +328,15 @@ def test_an_exact_calibration_in_force_is_good():
     in_force = {"COMPASS_MOTCT": 2.0, **ardupilot.correction_parameters(EXACT, 1, 1.0)}
     verdict = judge_present(Flown(seed=1, in_force=in_force).problem())
     assert verdict.grade is Grade.GOOD
+
+
+def test_the_bound_of_a_level_holds_its_doubt_to_both_sides():
+    """Level and facing east, 1.96 mGauss of 500 are 0.22°."""
+    exact = Correction(np.zeros(3), np.eye(3), np.zeros(3))
+    level = Level(u=0.0, u_std=0.0, centre=np.zeros(3), covariance=np.eye(3), count=9)
+    row = error_of_level(level, exact, (500.0, 0.0))
+    assert row.before == row.after == 0.0
+    assert row.p95 == pytest.approx(np.degrees(1.96 / 500.0), rel=0.07)
 
 
 CALIBRATED = {"COMPASS_MOTCT": 2.0, **ardupilot.correction_parameters(EXACT, 1, 1.0)}

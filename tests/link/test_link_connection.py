@@ -26,6 +26,7 @@ from magcomp.link.connection import Connection
 from magcomp.link.events import GapEnded, GapStarted, SinkFailed
 from magcomp.link.opening import open_transport
 from magcomp.link.replay import records
+from magcomp.link.streams import DEFAULT_RATES, affordable
 from magcomp.link.tcp import TcpTransport
 from magcomp.link.transport import TransportClosedError
 from magcomp.link.udp import UdpTransport
@@ -144,6 +145,20 @@ class TestEveryWay:
         assert all((b - a) % 256 == 1 for a, b in itertools.pairwise(numbers))
         stamps = [stamp for stamp, _ in sink.records]
         assert stamps == sorted(stamps)
+
+
+@pytest.mark.parametrize("baud", [9600, 57_600, 115_200])
+def test_a_slow_serial_line_is_asked_for_no_more_than_it_carries(baud):
+    """A byte takes ten bits on the line; USB, which takes no notice of a baud rate, says 115200."""
+    terminal = Terminal()
+    address = SerialLine(terminal.path, baud)
+    with serving(FakeVehicle(), terminal), connect(address, system=1) as link:
+        link.wait_vehicle(PATIENCE_S)
+        link.request_streams(DEFAULT_RATES, PATIENCE_S)
+        asked = link.requested_rates
+    whole = baud >= 115_200
+    assert asked == pytest.approx(DEFAULT_RATES if whole else affordable(DEFAULT_RATES, baud / 10))
+    assert (sum(asked.values()) == sum(DEFAULT_RATES.values())) is whole
 
 
 class TestComingBack:
