@@ -162,7 +162,9 @@ def test_no_attitude_is_named(recording, attitude):
 
 
 def test_a_time_without_readings_is_named(recording):
-    with pytest.raises(MissingDataError, match="usable readings of compass 1"):
+    with pytest.raises(
+        MissingDataError, match=r"usable .* from 59\.99 s, and the log ends at 60 s; "
+    ):
         readings(recording, 1, start=59.99)
 
 
