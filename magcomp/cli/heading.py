@@ -16,7 +16,7 @@ from magcomp import __version__, autopilots
 from magcomp.analysis import Options
 from magcomp.autopilots import Autopilot
 from magcomp.cli.heading_live import Following, follow, is_live
-from magcomp.cli.linking import LinkOptions, positive_seconds, reach_options
+from magcomp.cli.linking import LinkOptions, positive_seconds, reach_options, say_meaning
 from magcomp.cli.options import Selection, selection_options
 from magcomp.cli.output import answer, complain, look
 from magcomp.cli.work import fit_log, read_log
@@ -119,7 +119,7 @@ def heading(
         chosen = {} if parameters is None else _chosen(parameters, autopilots.ALL)
         wanted = Following(compass, chosen, positive_seconds(seconds) or math.inf, to_json)
         whom = replace(link, system=selection.system, component=selection.component)
-        return follow(source, whom, wanted)
+        return follow(say_meaning(source), whom, wanted)
     if seconds is not None:
         raise UsageError("--seconds must come with a live vehicle; instead received it with a log")
     log = Path(source)

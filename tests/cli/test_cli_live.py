@@ -303,3 +303,14 @@ def test_a_simulated_vehicle_says_where_it_is_and_writes_its_truth(tmp_path):
 def test_impossible_vehicles_are_refused(options, capsys):
     assert magcomp("simulate", f"udp:127.0.0.1:{free_port()}", *options) == ExitCode.USAGE
     assert "Traceback" not in capsys.readouterr().err
+
+
+def test_what_a_short_address_means_is_said(tmp_path, capsys):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(("127.0.0.1", 0))
+        short = f":{taken.getsockname()[1]}"
+        assert magcomp("record", short, "-o", tmp_path / "a.tlog") == ExitCode.LINK
+        said = capsys.readouterr().err
+        assert f"{short} means udp:127.0.0.1{short}: listen for UDP from this computer only" in said
+        assert magcomp("record", f"udp:127.0.0.1{short}", "-o", tmp_path / "a.tlog")
+        assert "means" not in capsys.readouterr().err
