@@ -1,6 +1,6 @@
 """ArduCopter's motor test: what MAV_CMD_DO_MOTOR_TEST does to the outputs. No messages, no clock.
 
-The rules, as in ArduCopter 4.x (ArduCopter/motor_test.cpp; docs/autopilots.md, ArduPilot: motor test):
+The rules (docs/autopilots.md, ArduPilot: motor test):
 
 - A test begins only on the ground. While one runs, the heartbeat says armed and failsafes are off.
 - A command during a test changes it, and begins its time anew.
