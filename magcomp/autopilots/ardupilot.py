@@ -37,6 +37,7 @@ from magcomp.autopilots.ardupilot_names import (
     suffix,
     vector_names,
 )
+from magcomp.autopilots.motor_test import ArduPilotMotorTest
 from magcomp.autopilots.protocol import (
     FieldMeaning,
     Kind,
@@ -116,6 +117,7 @@ class ArduPilot:
     first_slot_leads = True
     first_compass_message = "RAW_IMU"
     storage_s = 1.0  # a queue of writes, each soon, and the memory's lines after it
+    motor_test = ArduPilotMotorTest()
     device_ids_describe = "bus, address and type of a sensor, which are alike in vehicles of a kind"
 
     def require_fittable(self, recording: Recording) -> None:

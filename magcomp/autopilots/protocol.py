@@ -13,6 +13,7 @@ from typing import Protocol
 
 import numpy as np
 
+from magcomp.autopilots.motor_test import MotorTest
 from magcomp.errors import InputError
 from magcomp.model import (
     Compass,
@@ -214,6 +215,11 @@ class Autopilot(Protocol):
     @property
     def storage_s(self) -> float:
         """Seconds after which a write survives a restart."""
+        ...
+
+    @property
+    def motor_test(self) -> MotorTest:
+        """How motors are spun on the ground."""
         ...
 
     @property
