@@ -56,6 +56,7 @@ from magcomp.model import (
     Recording,
     Series,
     Vehicle,
+    quantity_of,
 )
 
 FIRST_VERSION = (1, 12)
@@ -232,7 +233,7 @@ class Px4:
             wanted = _with_shape(wanted, present)
         made = noticed(wanted, present, offset_zone(values), rotation)
         if usual >= _LEAST_USUAL[regressor]:
-            power = usual if regressor == THROTTLE else usual / MGAUSS
+            power = usual if quantity_of(regressor).is_throttle else usual / MGAUSS
             missed = (made.offset - wanted.offset) / power
             made = replace(made, motor=made.motor + missed)
         found = _vector("COMP", compass, made.motor) | _vector("OFF", compass, made.offset)

@@ -11,7 +11,7 @@ from rich.text import Text
 
 from magcomp import autopilots
 from magcomp.autopilots import Kind
-from magcomp.model import CURRENT, CompassResult, MotorFit, Verdict
+from magcomp.model import CompassResult, MotorFit, Verdict, quantity_of
 from magcomp.report import words
 
 _DECIMALS = {Kind.OFFSET: 2, Kind.DIAGONAL: 4, Kind.OFF_DIAGONAL: 4}
@@ -158,7 +158,7 @@ def levels(result: CompassResult) -> Table:
     table.add_column(Text("readings", style="dim"), justify="right", min_width=9)
     for level in fit.levels:
         std = np.sqrt(np.diag(level.covariance))
-        u = f"{level.u:.1f} A" if fit.regressor == CURRENT else f"{100 * level.u:.1f} %"
+        u = quantity_of(fit.regressor).precise(level.u)
         centre = [
             words.with_std(float(c), float(s)) for c, s in zip(level.centre, std, strict=True)
         ]
