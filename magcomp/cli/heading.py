@@ -19,7 +19,7 @@ from magcomp.cli.heading_live import Following, follow, is_live
 from magcomp.cli.linking import LinkOptions, positive_seconds, reach_options, say_meaning
 from magcomp.cli.options import Selection, selection_options
 from magcomp.cli.output import answer, complain, look
-from magcomp.cli.work import fit_log, read_log
+from magcomp.cli.work import fit_log, read_log, read_parameters
 from magcomp.compensate import Gravity, Track, track
 from magcomp.errors import ExitCode, MissingDataError, ParameterFileError, UsageError
 from magcomp.experiments.motion import HeadingAccuracy, accuracy, heading_errors
@@ -27,7 +27,6 @@ from magcomp.geometry import wrap_angle
 from magcomp.model import FloatArray, Grade, InForce, Recording, Series
 from magcomp.report.words import printable
 from magcomp.sources.truth import Truth, read_truth
-from magcomp.writing.files import read_parameter_file
 
 _NAMES = ("raw", "corrected", "fused")
 _SIGNS = (".", "+", "•")
@@ -168,7 +167,7 @@ def _correction(
 
 
 def _chosen(parameters: Path, known: Sequence[Autopilot]) -> Mapping[str, float]:
-    chosen = read_parameter_file(parameters).values
+    chosen = read_parameters(parameters).values
     prefixes = tuple(autopilot.compass_prefix for autopilot in known)
     if not any(name.startswith(prefixes) for name in chosen):
         raise ParameterFileError(
