@@ -22,7 +22,7 @@ from magcomp.simulate.ahrs import Ahrs
 from magcomp.simulate.autopilot import Autopilot
 from magcomp.simulate.correction import Correction
 from magcomp.simulate.habits import Habits, own_number
-from magcomp.simulate.outputs import motor_outputs
+from magcomp.simulate.outputs import motor_outputs, motor_thrust
 from magcomp.simulate.parameters import ParameterStore, initial_values
 from magcomp.simulate.pilot import Pilot
 from magcomp.simulate.programs import Scenario
@@ -125,6 +125,12 @@ class Vehicle:
     def armed(self) -> bool:
         """Whether the motors are armed."""
         return self._autopilot.armed
+
+    @property
+    def spinning(self) -> tuple[int, ...]:
+        """The motors that a motor test drives at this moment, counted from 1."""
+        outputs = self._autopilot.motor_test.outputs
+        return tuple(np.flatnonzero(outputs > self._store["MOT_PWM_MIN"]) + 1)
 
     @property
     def parameters(self) -> Mapping[str, float]:
@@ -238,7 +244,22 @@ class Vehicle:
         self._obey(bool(motion.armed[-1]))
         self._autopilot.flying = bool(motion.position[-1, 2] < -_FLYING_M)
         self._physics, self._block = physics.advance(
-            self._physics, motion, self.armed, self.truth, self._field.ned, self._rng
+            self._physics,
+            motion,
+            self.armed,
+            self.truth,
+            self._field.ned,
+            self._rng,
+            self._tested(),
+        )
+
+    def _tested(self) -> FloatArray | None:
+        """What a motor test makes of each motor, 0 … 1, shape (4,); None where none runs."""
+        test = self._autopilot.motor_test
+        if not test.running:
+            return None
+        return motor_thrust(
+            test.outputs, altitude_m=self.truth.home[2], parameters=self._store.values
         )
 
     def _obey(self, wants_armed: bool) -> None:
@@ -278,6 +299,8 @@ class Vehicle:
         )
 
     def _outputs(self, demand: FloatArray) -> FloatArray:
+        if self._autopilot.motor_test.running:
+            return self._autopilot.motor_test.outputs
         return motor_outputs(
             demand,
             armed=self.armed,
