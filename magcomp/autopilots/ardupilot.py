@@ -113,6 +113,7 @@ class ArduPilot:
     switch = COMPENSATION_SWITCH
     compass_prefix = "COMPASS_"
     device_id_names = tuple(single_name("DEV_ID", compass) for compass in NUMBERS)
+    log_folder = "APM/LOGS"
     kept_names = KEPT
     batteries = (0,)
     first_slot_leads = True

@@ -198,6 +198,11 @@ class Autopilot(Protocol):
         ...
 
     @property
+    def log_folder(self) -> str:
+        """Where on the vehicle's card its logs are."""
+        ...
+
+    @property
     def kept_names(self) -> re.Pattern[str]:
         """Parameters whose values the vehicle itself keeps: a write would not last."""
         ...

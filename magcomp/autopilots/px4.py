@@ -105,6 +105,7 @@ class Px4:
     switch = COMPENSATION_SWITCH
     compass_prefix = "CAL_MAG"
     device_id_names = tuple(single_name("ID", number) for number in NUMBERS)
+    log_folder = "log"
     kept_names = KEPT
     batteries = (0, 1)
     first_slot_leads = False
