@@ -12,10 +12,10 @@ import click
 
 from magcomp.cli.linking import stop_on_interrupt
 from magcomp.cli.output import answer, complain
+from magcomp.cli.work import read_parameters
 from magcomp.errors import ExitCode
 from magcomp.link import read_signing_key
 from magcomp.simulate import AUTOPILOTS, PROGRAMS, Faults, Vehicle, scenario, serve
-from magcomp.writing.files import read_parameter_file
 
 _ADDRESS = "udpout:127.0.0.1:14550"
 
@@ -122,7 +122,7 @@ def simulate(
     """
     key = None if signing_key is None else read_signing_key(signing_key)
     chosen = scenario(program, seed)
-    held = {} if parameters is None else read_parameter_file(parameters).values
+    held = {} if parameters is None else read_parameters(parameters).values
     vehicle = Vehicle(
         chosen,
         start_unix_s=time.time(),

@@ -8,6 +8,7 @@ The rules, as in ArduCopter 4.6 (docs/autopilots.md, ArduPilot: parameters):
 - The parameter list comes at its own pace; asking again begins it again.
 - At most 20 requests to read one parameter wait; more are dropped.
 - A command that is not known is acknowledged as unsupported.
+- A motor test is refused in the air, and looks armed while it runs (motor_test.py).
 - With SYSID_ENFORCE only the ground station whose system is SYSID_MYGCS is listened to.
 """
 
@@ -21,6 +22,7 @@ import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from magcomp.simulate.habits import BOARD_VERSION, Habits
+from magcomp.simulate.motor_test import MotorTest
 from magcomp.simulate.parameters import ParameterStore, is_read_only
 from magcomp.simulate.streams import GROUPS, TELEMETRY
 from magcomp.simulate.talker import Talker
@@ -70,6 +72,7 @@ class Autopilot(Talker):
     def start_up(self) -> None:
         """Forget what a reboot forgets; announce the firmware."""
         self.forget()
+        self.motor_test = MotorTest(self.store["MOT_PWM_MIN"], self.store["MOT_PWM_MAX"])
         self._list: deque[tuple[int, str]] = deque()
         self._reads: deque[Any] = deque()
         self.store.sort_compasses()
@@ -88,6 +91,10 @@ class Autopilot(Talker):
         """Store and send the next few parameters; called every 10 ms, in seconds since power-up."""
         self._now_s = now_s
         self.store.settle(now_s)
+        if self.motor_test.running:
+            self.motor_test.advance(now_s)
+            if not self.motor_test.running:
+                self._end_motor_test()
         for _ in range(min(_READS_PER_10_MS, len(self._reads))):
             self._answer_read(self._reads.popleft())
         names = len(self.store.listed) if self._list else 0
@@ -97,7 +104,7 @@ class Autopilot(Talker):
 
     def arm(self, *, force: bool = False) -> bool:
         """Arm, unless a check forbids it; whether the motors are armed now."""
-        if not self.armed:
+        if not self.armed and not self.motor_test.running:
             reason = None if force else self._arming_objection()
             if reason is not None:
                 self.say(f"Arm: {reason}", mavlink.MAV_SEVERITY_CRITICAL)
@@ -108,6 +115,8 @@ class Autopilot(Talker):
 
     def disarm(self, *, force: bool = False) -> bool:
         """Disarm, unless in the air; whether the motors are disarmed now."""
+        if self.motor_test.running:
+            self._end_motor_test()
         if self.armed:
             if self.flying and not force:
                 return False
@@ -128,14 +137,15 @@ class Autopilot(Talker):
         mode |= mavlink.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
         if self.mode in (_MODES["auto"], _MODES["guided"]):
             mode |= mavlink.MAV_MODE_FLAG_GUIDED_ENABLED
-        if self.armed:
+        armed = self.armed or self.motor_test.running
+        if armed:
             mode |= mavlink.MAV_MODE_FLAG_SAFETY_ARMED
         return mavlink.MAVLink_heartbeat_message(
             type=mavlink.MAV_TYPE_QUADROTOR,
             autopilot=mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA,
             base_mode=mode,
             custom_mode=self.mode,
-            system_status=mavlink.MAV_STATE_ACTIVE if self.armed else mavlink.MAV_STATE_STANDBY,
+            system_status=mavlink.MAV_STATE_ACTIVE if armed else mavlink.MAV_STATE_STANDBY,
             mavlink_version=3,
         )
 
@@ -274,10 +284,26 @@ class Autopilot(Talker):
         return int(mavlink.MAV_RESULT_ACCEPTED)
 
     def _reboot(self, message: Any, now_ms: int) -> int:  # noqa: ARG002
-        if message.param1 != 1.0 or self.armed:
+        if message.param1 != 1.0 or self.armed or self.motor_test.running:
             return int(mavlink.MAV_RESULT_FAILED)
         self.reboot_wanted = True
         return int(mavlink.MAV_RESULT_ACCEPTED)
+
+    def _test_motor(self, message: Any, now_ms: int) -> int:  # noqa: ARG002
+        if not self.motor_test.running:
+            if self.flying:
+                self.say("Motor Test: vehicle not landed", mavlink.MAV_SEVERITY_CRITICAL)
+                return int(mavlink.MAV_RESULT_FAILED)
+            self.say("starting motor test")
+        count = message.param5 if message.get_type() == "COMMAND_LONG" else message.x
+        values = (message.param1, message.param2, message.param3, message.param4, count)
+        self.motor_test.command(values, self._now_s)
+        return int(mavlink.MAV_RESULT_ACCEPTED)
+
+    def _end_motor_test(self) -> None:
+        self.say("finished motor test")
+        self.motor_test.stop()
+        self.armed = False
 
     def _set_mode(self, message: Any, now_ms: int) -> int:  # noqa: ARG002
         self.mode = int(message.param2)
@@ -303,4 +329,5 @@ class Autopilot(Talker):
         mavlink.MAV_CMD_COMPONENT_ARM_DISARM: Talker.arm_or_disarm,
         mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: _reboot,
         mavlink.MAV_CMD_DO_SET_MODE: _set_mode,
+        mavlink.MAV_CMD_DO_MOTOR_TEST: _test_motor,
     }

@@ -16,7 +16,7 @@ from magcomp.simulate.correction import Correction
 from magcomp.simulate.habits import Habits
 from magcomp.simulate.moment import Moment
 from magcomp.simulate.motion import FloatArray
-from magcomp.simulate.outputs import motor_outputs
+from magcomp.simulate.outputs import motor_outputs, motor_thrust
 from magcomp.simulate.parameters import ParameterStore, initial_values
 from magcomp.simulate.talker import Talker
 from magcomp.simulate.truth import Truth
@@ -91,6 +91,21 @@ class Copter:
         """What the vehicle really is."""
         return self._truth.as_json()
 
+    @property
+    def spinning(self) -> tuple[int, ...]:
+        """The motors that a motor test drives at this moment, counted from 1."""
+        outputs = self._autopilot.motor_test.outputs
+        return tuple(np.flatnonzero(outputs > self._store["MOT_PWM_MIN"]) + 1)
+
+    def tested(self) -> FloatArray | None:
+        """What a motor test makes of each motor."""
+        test = self._autopilot.motor_test
+        if not test.running:
+            return None
+        return motor_thrust(
+            test.outputs, altitude_m=self._truth.home[2], parameters=self._store.values
+        )
+
     def fly(self, mode: int) -> None:
         """Take a flight mode and arm."""
         self._autopilot.mode = mode
@@ -164,6 +179,8 @@ class Copter:
         )
 
     def _outputs(self, moment: Moment, demand: FloatArray) -> FloatArray:
+        if self._autopilot.motor_test.running:
+            return self._autopilot.motor_test.outputs
         return motor_outputs(
             demand,
             armed=self._autopilot.armed,

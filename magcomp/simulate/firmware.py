@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Protocol
 
-from magcomp.simulate.moment import Moment
+from magcomp.simulate.moment import FloatArray, Moment
 from magcomp.simulate.talker import Talker
 
 
@@ -29,6 +29,15 @@ class Firmware(Protocol):
 
     def truth(self) -> Mapping[str, Any]:
         """What the vehicle really is, in the form of the .json beside a recording of its make."""
+        ...
+
+    @property
+    def spinning(self) -> tuple[int, ...]:
+        """The motors that a motor test drives at this moment, counted from 1."""
+        ...
+
+    def tested(self) -> FloatArray | None:
+        """Thrust of each motor, 0 … 1, shape (4,), while a motor test runs; else None."""
         ...
 
     def fly(self, mode: int) -> None:

@@ -140,6 +140,11 @@ class Vehicle:
         return self._talker.armed
 
     @property
+    def spinning(self) -> tuple[int, ...]:
+        """The motors that a motor test drives at this moment, counted from 1."""
+        return self._firmware.spinning
+
+    @property
     def parameters(self) -> Mapping[str, float]:
         """What the autopilot holds."""
         return self._firmware.parameters
@@ -268,7 +273,13 @@ class Vehicle:
         self._obey(bool(motion.armed[-1]))
         self._talker.flying = bool(motion.position[-1, 2] < -_FLYING_M)
         self._physics, self._block = physics.advance(
-            self._physics, motion, self.armed, self.truth, self._field.ned, self._rng
+            self._physics,
+            motion,
+            self.armed,
+            self.truth,
+            self._field.ned,
+            self._rng,
+            self._firmware.tested(),
         )
 
     def _obey(self, wants_armed: bool) -> None:

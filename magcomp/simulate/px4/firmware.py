@@ -97,6 +97,15 @@ class Px4:
         """What the vehicle really is."""
         return as_json(self._truth, self._field)
 
+    @property
+    def spinning(self) -> tuple[int, ...]:
+        """No motor by a test."""
+        return ()
+
+    def tested(self) -> None:
+        """No motor test: what a ground station asks for is not supported."""
+        return
+
     def fly(self, mode: int) -> None:
         """Take a flight mode and arm."""
         self._talker.take_mode(mode)
