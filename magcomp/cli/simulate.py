@@ -55,7 +55,7 @@ def _fault_options(command: Callable[..., _Result]) -> Callable[..., _Result]:
 @click.option(
     "--autopilot",
     type=click.Choice(list(AUTOPILOTS)),
-    default="ardupilot",
+    default=next(iter(AUTOPILOTS)),
     show_default=True,
     help="Whose firmware it has.",
 )

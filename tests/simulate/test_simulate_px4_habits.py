@@ -1,6 +1,6 @@
 """The simulated PX4's parameters and commands, and which calibration is in force: one test a rule.
 
-The rules are docs/autopilots.md's, PX4.
+The rules: docs/autopilots.md, PX4: in force, PX4: parameters, PX4: commands and PX4: learning.
 """
 
 from __future__ import annotations

@@ -15,16 +15,16 @@ The rules (docs/autopilots.md, PX4: parameters, and PX4: commands):
 
 from __future__ import annotations
 
-import struct
 from collections import deque
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
+import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from magcomp.mavlink.parameters import NO_INDEX, Encoding, as_float, encode_value
+from magcomp.mavlink.parameters import NO_INDEX, Encoding, as_float, decode_values, encode_value
 from magcomp.simulate.habits import BOARD_VERSION, Habits
-from magcomp.simulate.px4.parameters import INT32, Parameters
+from magcomp.simulate.px4.parameters import Parameters
 from magcomp.simulate.px4.streams import DEFAULT_RATES, TELEMETRY
 from magcomp.simulate.talker import Talker
 
@@ -174,7 +174,7 @@ class Px4Talker(Talker):
         )
 
     def _send_hash(self) -> None:
-        value = as_float(struct.pack("<I", self._parameters.hash()))
+        value = as_float(encode_value(self._parameters.hash(), _UINT32, Encoding.BYTEWISE))
         self._send_value(_HASH, value, _UINT32, len(self._parameters.shown), NO_INDEX)
 
     def _send_value(self, name: str, field: float, kind: int, count: int, index: int) -> None:
@@ -212,14 +212,12 @@ class Px4Talker(Talker):
         elif name in self.habits.denied:
             self._object(message, "READ_ONLY")
         elif name not in self.habits.ignored:
-            whole = message.param_type == INT32
-            (value,) = struct.unpack(
-                "<i" if whole else "<f", struct.pack("<f", message.param_value)
-            )
+            sent = np.array([message.param_value], np.float32)
+            (value,) = decode_values(sent, np.array([message.param_type]), Encoding.BYTEWISE)
             if name in self.habits.clamped:
                 low, high = self.habits.clamped[name]
                 value = min(max(value, low), high)
-            self._parameters.set(name, value, self._now_s)
+            self._parameters.set(name, float(value), self._now_s)
             self._send(name)
 
     def _object(self, message: Any, error: str) -> None:

@@ -8,7 +8,6 @@ nothing acts on it until another parameter changes.
 from __future__ import annotations
 
 import csv
-import struct
 import zlib
 from collections.abc import Mapping
 from importlib import resources
@@ -17,7 +16,7 @@ from types import MappingProxyType
 import numpy as np
 
 from magcomp.autopilots.px4_names import SLOTS, VECTORS, angle_names, single_name, vector_names
-from magcomp.mavlink.parameters import REAL32
+from magcomp.mavlink.parameters import REAL32, Encoding, encode_value
 from magcomp.simulate.px4.sensors import DEVICE_IDS, EXTERNAL_ROTATION, started
 from magcomp.simulate.truth import Truth
 
@@ -103,9 +102,8 @@ class Parameters:
         for name in self.shown:
             if (name.endswith(_NOT_IN_HASH) and name.startswith("CAL_MAG")) or name in _COUNTERS:
                 continue
-            whole = self._types[name] == INT32
-            value = struct.pack("<i" if whole else "<f", self._as_held(name))
-            crc = zlib.crc32(value, zlib.crc32(name.encode(), crc))
+            field = encode_value(self._values[name], self._types[name], Encoding.BYTEWISE)
+            crc = zlib.crc32(field, zlib.crc32(name.encode(), crc))
         return crc
 
     def set(self, name: str, value: float, now_s: float) -> None:
@@ -134,10 +132,6 @@ class Parameters:
 
     def _held(self, name: str, value: float) -> float:
         return float(int(value)) if self._types[name] == INT32 else float(np.float32(value))
-
-    def _as_held(self, name: str) -> float:
-        value = self._values[name]
-        return int(value) if self._types[name] == INT32 else value
 
 
 def initial_values(truth: Truth) -> dict[str, float]:
