@@ -18,7 +18,7 @@ from magcomp.autopilots import Autopilot
 from magcomp.cli.heading_live import Following, follow, is_live
 from magcomp.cli.linking import LinkOptions, positive_seconds, reach_options, say_meaning
 from magcomp.cli.options import Selection, selection_options
-from magcomp.cli.output import answer, complain, look
+from magcomp.cli.output import answer, answer_words, complain, look, wrapped
 from magcomp.cli.work import fit_log, read_log, read_parameters
 from magcomp.compensate import Gravity, Track, track
 from magcomp.errors import ExitCode, MissingDataError, ParameterFileError, UsageError
@@ -136,9 +136,9 @@ def heading(
     if to_json:
         answer(json.dumps(_document(found), allow_nan=False) + "\n")
         return ExitCode.GOOD
-    answer(_text(found))
+    answer_words(_text(found))
     if plot:
-        answer(_plots(found))
+        answer_words(_plots(found))
     return ExitCode.GOOD
 
 
@@ -221,9 +221,12 @@ def _text(found: _Answer) -> str:
     lines = [
         "",
         f" {printable(found.recording.source)}, compass {made.compass}",
-        f" corrected by {printable(found.origin)}, {by}; "
-        f"the field is {1000 * made.field_lag_s:.0f} ms late, "
-        f"declination {math.degrees(made.declination):+.1f}°",
+        *wrapped(
+            f"corrected by {printable(found.origin)}, {by}; "
+            f"the field is {1000 * made.field_lag_s:.0f} ms late, "
+            f"declination {math.degrees(made.declination):+.1f}°",
+            look().columns,
+        ),
         "",
         "".join([f" {'time, s':>9}", *(f"{name:>13}" for name in headings)]),
     ]
