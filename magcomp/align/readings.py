@@ -85,8 +85,9 @@ def readings(
     keep &= _usable_state(reported.time, recording.armed)
     if not keep.any():
         raise MissingDataError(
-            f"{recording.source} must hold usable readings of compass {compass} in the time "
-            f"asked for; instead {_unusable(int(asked.sum()), len(reported))}"
+            f"{recording.source} must hold usable readings of compass {compass}"
+            f"{_span(start, end, recording.duration_s)}; instead "
+            f"{_unusable(int(asked.sum()), len(reported))}"
         )
     time = reported.time[keep]
     in_force, stretch = _corrections(recording, compass, time, changes)
@@ -123,11 +124,19 @@ def _within_span(recording: Recording, time: FloatArray, start: float, end: floa
     return np.asarray((time >= start) & (time <= end))
 
 
+def _span(start: float, end: float, duration: float) -> str:
+    """The time asked for, in words; nothing where that is all there is."""
+    if start <= 0.0 and end >= duration:
+        return ""
+    until = f" to {end:g} s" if end < duration else f", and the log ends at {duration:.0f} s"
+    return f" from {max(start, 0.0):g} s{until}"
+
+
 def _unusable(asked: int, all_: int) -> str:
     """In words, why no reading is left of those in the time asked for."""
     if not asked:
-        return f"none of its {all_} is in that time"
-    return f"all {asked} of that time were repeats, in gaps of the attitude, or taken disarmed"
+        return f"none of its {all_} is there"
+    return f"all {asked} there were repeats, in gaps of the attitude, or taken disarmed"
 
 
 def within(readings: Readings, known: Series) -> Readings:

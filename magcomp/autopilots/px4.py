@@ -36,6 +36,7 @@ from magcomp.autopilots.px4_correction import (
 from magcomp.autopilots.px4_emission import noticed
 from magcomp.autopilots.px4_names import (
     COMPENSATION_SWITCH,
+    KEPT,
     integer_type,
     parse,
     single_name,
@@ -105,6 +106,8 @@ class Px4:
     switch = COMPENSATION_SWITCH
     compass_prefix = "CAL_MAG"
     device_id_names = tuple(single_name("ID", number) for number in NUMBERS)
+    log_folder = "log"
+    kept_names = KEPT
     batteries = (0, 1)
     first_slot_leads = False
     first_compass_message = "SCALED_IMU"

@@ -19,7 +19,7 @@ from textual.color import Color
 from magcomp.analysis import Options
 from magcomp.live.progress import Bound, HoverBound, hover_bound
 from magcomp.model import Grade, ParameterSet
-from magcomp.tui.ascii import is_ascii_only, plain
+from magcomp.report.ascii import is_ascii_only, plain
 from magcomp.tui.before_after import HeadingPair, HeadingWatch, heading_pairs
 from magcomp.tui.changes import after_event, change_rows
 from magcomp.tui.fits import difference_deg, fit_rows
