@@ -29,6 +29,7 @@ from magcomp.autopilots.ardupilot_names import (
     ACTING,
     COMPASS_COUNT,
     COMPENSATION_SWITCH,
+    KEPT,
     NUMBERS,
     PER_MOTOR_SWITCH,
     integer_type,
@@ -113,6 +114,8 @@ class ArduPilot:
     switch = COMPENSATION_SWITCH
     compass_prefix = "COMPASS_"
     device_id_names = tuple(single_name("DEV_ID", compass) for compass in NUMBERS)
+    log_folder = "APM/LOGS"
+    kept_names = KEPT
     batteries = (0,)
     first_slot_leads = True
     first_compass_message = "RAW_IMU"

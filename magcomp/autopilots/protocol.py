@@ -6,6 +6,7 @@ its compass parameters; it asks the implementation, which :func:`magcomp.autopil
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
@@ -195,6 +196,16 @@ class Autopilot(Protocol):
     @property
     def device_id_names(self) -> tuple[str, ...]:
         """Parameters that hold the compasses' device ids, in the order of the slots."""
+        ...
+
+    @property
+    def log_folder(self) -> str:
+        """Where on the vehicle's card its logs are."""
+        ...
+
+    @property
+    def kept_names(self) -> re.Pattern[str]:
+        """Parameters whose values the vehicle itself keeps: a write would not last."""
         ...
 
     @property

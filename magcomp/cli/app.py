@@ -48,13 +48,6 @@ COMMANDS = {
 }
 
 
-WHERE_LOGS_ARE = (
-    r"Logs are kept by Mission Planner in Documents\Mission Planner\logs, by QGroundControl in "
-    "Documents/QGroundControl/Telemetry, by MAVProxy as mav.tlog in the folder it was started in, "
-    "by ArduPilot on its card in APM/LOGS, and by PX4 in log"
-)
-
-
 class LazyGroup(click.Group):
     """A group that imports a command's module when the command is called."""
 
@@ -132,7 +125,10 @@ def run(arguments: list[str]) -> int:
         sentence, code, foreseen = _explain(error)
         complain(sentence)
         if isinstance(error, NoLogError):
-            complain(WHERE_LOGS_ARE)
+            # What reads logs is imported by now, and this with it.
+            from magcomp.cli.places import where_logs_are  # noqa: PLC0415
+
+            complain(where_logs_are())
         for note in getattr(error, "__notes__", ()):
             complain(note)
         if not foreseen and ("--debug" in arguments or os.environ.get("MAGCOMP_DEBUG")):

@@ -15,7 +15,7 @@ from typing import TypeVar
 
 import click
 
-from magcomp.cli.output import complain
+from magcomp.cli.output import complain, takes_ascii_only
 from magcomp.cli.vehicle import vehicle_options
 from magcomp.errors import AddressError, UsageError
 from magcomp.link import (
@@ -26,6 +26,7 @@ from magcomp.link import (
     parse_address,
     read_signing_key,
 )
+from magcomp.report.ascii import encodable, plain
 
 _Result = TypeVar("_Result")
 
@@ -233,7 +234,7 @@ def _columns() -> int:
 
 def _to_stderr(text: str) -> None:
     if sys.stderr is not None:
-        encoding = sys.stderr.encoding or "utf-8"
+        shown = plain(text) if takes_ascii_only(sys.stderr) else text
         with contextlib.suppress(BrokenPipeError):
-            sys.stderr.write(text.encode(encoding, errors="replace").decode(encoding))
+            sys.stderr.write(encodable(shown, sys.stderr.encoding or "utf-8"))
             sys.stderr.flush()

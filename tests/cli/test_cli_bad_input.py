@@ -23,7 +23,8 @@ from logs_made_of_logs import (
 )
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from magcomp.cli.app import WHERE_LOGS_ARE, run
+from magcomp.cli.app import run
+from magcomp.cli.places import where_logs_are
 
 SINGLE = ("--compass", "1", "--regressor", "current")
 """The least work a fit can be."""
@@ -115,7 +116,7 @@ def test_bad_input_gets_one_sentence(
     assert captured.err.startswith("magcomp: ")
     assert captured.err.endswith((".\n", "?\n"))
     assert captured.err.count("\n") == (2 if make in NO_LOG else 1)
-    assert (WHERE_LOGS_ARE in captured.err) == (make in NO_LOG)
+    assert (where_logs_are() in captured.err) == (make in NO_LOG)
     assert why in captured.err
 
 
