@@ -48,5 +48,5 @@ def test_the_fit_is_within_2_per_cent_of_the_truth(swept, analysis):
     assert len(analysis.compasses) == 3
     for result in analysis.compasses:
         assert result.fit.method == "sweep"
-        error = np.linalg.norm(-result.fit.correction.motor - truth)
+        error = np.linalg.norm(-result.fit.correction.vector - truth)
         assert error < 0.02 * np.linalg.norm(truth)
