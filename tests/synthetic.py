@@ -67,7 +67,7 @@ def stored(correction: Correction, compass: int = 1) -> dict[str, float]:
         "OFS": correction.offset,
         "DIA": np.diag(iron),
         "ODI": iron[(0, 0, 1), (1, 2, 2)],
-        "MOT": correction.motor,
+        "MOT": correction.vector,
     }
     return {
         f"COMPASS_{kind}{number}_{axis}": float(np.float32(value))
@@ -89,7 +89,8 @@ def as_ardupilot(
     (x, y, z), (xy, xz, yz) = vector("DIA", 1.0), vector("ODI")
     soft_iron = np.array([[x, xy, xz], [xy, y, yz], [xz, yz, z]])
     motor = vector("MOT") if values.get("COMPASS_MOTCT") in (1.0, 2.0) else np.zeros(3)
-    return (raw + vector("OFS")) @ soft_iron + np.multiply.outer(amperes, motor)
+    scale = values.get(f"COMPASS_SCALE{number}", 1.0)
+    return scale * (raw + vector("OFS")) @ soft_iron + np.multiply.outer(amperes, motor)
 
 
 @dataclass(frozen=True)
