@@ -115,7 +115,7 @@ def test_an_existing_table_is_not_overwritten(written, capsys):
     assert (written / "table.json").read_bytes() == before
 
 
-@pytest.mark.parametrize("seed", [2, 3, 4])
+@pytest.mark.parametrize("seed", [2, *(pytest.param(n, marks=pytest.mark.slow) for n in (3, 4))])
 def test_the_claims_do_not_depend_on_the_vehicle(seed, tmp_path):
     log = tmp_path / "turntable.tlog"
     write_tlog(log, program="turntable_paper", seed=seed)

@@ -103,7 +103,7 @@ class MagcompApp(BaseApp):
 
     def on_snapshot_taken(self, message: SnapshotTaken) -> None:
         """Draw the vehicle as it stands."""
-        if self.session is not None:
+        if self.session is not None and message.snapshot is not self.live:
             self.live = message.snapshot
             opening.watch_vehicle(self)
             verifying.watch_flight(self)

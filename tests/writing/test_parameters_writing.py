@@ -152,7 +152,7 @@ def messages_of_a_clean_write(folder: Path) -> int:
     return link.messages - before
 
 
-@pytest.mark.parametrize("step", [17, pytest.param(1, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("step", [41, pytest.param(1, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_fault_at_any_message_leaves_all_old_or_all_new_or_off_and_restorable(
     tmp_path: Path, fault: Callable[[FakeLink], None], step: int
