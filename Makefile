@@ -8,15 +8,16 @@ BIN    := $(VENV)/bin
 demo: $(VENV)/installed
 	@$(BIN)/magcomp demo
 
-# All but what waits in real time for tens of seconds; `make test-all` has that too.
+# All but what waits or computes for tens of seconds; `make test-all` has that too, and looks
+# five times as long for what breaks a parser or a protocol.
 test: $(VENV)/installed-dev lint
-	@$(BIN)/python -m pytest -n 2 -q -m "not slow"
+	@$(BIN)/python -m pytest -n 2 --dist worksteal -q -m "not slow"
 
 test-all: $(VENV)/installed-dev lint
-	@$(BIN)/python -m pytest -n 2 -q
+	@MAGCOMP_EFFORT=5 $(BIN)/python -m pytest -n 2 --dist worksteal -q
 
 coverage: $(VENV)/installed-dev
-	@$(BIN)/python -m pytest -n 2 -q -m "not slow" --cov --cov-report=term
+	@$(BIN)/python -m pytest -n 2 --dist worksteal -q -m "not slow" --cov --cov-report=term
 
 lint: $(VENV)/installed-dev
 	@$(BIN)/ruff check magcomp tests benchmarks examples

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 
+from effort import examples
 from hypothesis import settings
 
 # The matrices of a fit are small: more threads only wait for each other. Set before numpy is
@@ -15,7 +16,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ["LC_ALL"] = "C.UTF-8"
 
 # A busy machine is slow, not wrong: no test here is about the time of one example.
-settings.register_profile("magcomp", deadline=None)
+settings.register_profile("magcomp", deadline=None, max_examples=examples(50))
 settings.load_profile("magcomp")
 
 # Serial ports and terminals are played by pseudo-terminals, which Windows has not.

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 import recordings
 import truth
-from hypothesis import given
+from effort import examples
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from logs_made_of_logs import Frame, frames, write
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -284,6 +285,7 @@ def test_options_that_cannot_be_are_refused(wrong):
         Options(**wrong)
 
 
+@settings(max_examples=examples(12))
 @given(st.floats(0.0, 30.0), st.floats(60.0, 100.0))
 def test_a_part_of_the_log_is_fitted_by_its_own_readings(start, end):
     recording = PART

@@ -81,7 +81,7 @@ def test_what_once_failed_ends_well(said: list[str], capsys: pytest.CaptureFixtu
     must_end_well([said[0], str(FIXTURES / said[1]), *said[2:]], capsys)
 
 
-@settings(max_examples=15, **LOOSE)
+@settings(max_examples=8, **LOOSE)
 @given(said=words())
 def test_some_options_end_well(said: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     must_end_well(said, capsys)

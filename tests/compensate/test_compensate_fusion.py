@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from effort import examples
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -212,7 +213,7 @@ events_of_any_kind = st.one_of(
 )
 
 
-@settings(max_examples=200)
+@settings(max_examples=examples(70))
 @given(st.lists(events_of_any_kind, max_size=40))
 def test_whatever_arrives_in_whatever_order_the_heading_is_an_angle_or_unknown(events):
     for answer in fuse(events, Compensator(NOTHING), Fusion()):

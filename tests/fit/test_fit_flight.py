@@ -64,8 +64,8 @@ def test_a_wrong_motor_compensation_in_force_is_undone_first():
 
 def test_the_covariance_of_a_flight_is_what_repetition_shows():
     weights = [
-        weighed(fit(Flown(seed=100 + s, seconds=120.0).problem(), "flight"), slice(0, 3))
-        for s in range(25)
+        weighed(fit(Flown(seed=100 + s, seconds=90.0).problem(), "flight"), slice(0, 3))
+        for s in range(12)
     ]
     # The prior of a trusted hard iron is wider than these recordings' error, so less than 1 is
     # honest; three times is not.

@@ -23,7 +23,7 @@ from magcomp.fit.line import (
 )
 from magcomp.model import Level
 
-SEEDS = range(40)
+SEEDS = range(24)
 POSITIONS = np.array([0.0, 25.0, 50.0, 75.0, 100.0])
 POINT = np.array([12.0, -30.0, 45.0])
 STEEP = np.array([0.4, -0.3, 0.87])
@@ -125,7 +125,7 @@ def test_feet_and_distances_are_pythagoras(seed):
 # --- the paper's iteration, docs/method.md, Equations 14 to 16 ---------------------
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", range(1))
 def test_the_papers_line_is_what_its_printed_equations_iterate_to(seed):
     centres = noisy(STEEP, seed)
     x, y, z = centres.T
@@ -144,7 +144,7 @@ def test_the_papers_line_is_what_its_printed_equations_iterate_to(seed):
     assert np.allclose(on_z[:, 1], xi[2] * z + xi[3], atol=1e-6)
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 def test_the_papers_iteration_goes_on_until_it_has_settled(seed):
     centres = noisy(STEEP, seed)
     once, longer = paper_line(centres), paper_line(centres, threshold=1e-13, most=200_000)
@@ -230,7 +230,7 @@ def drawn(direction: np.ndarray, covariances: np.ndarray, seed: int) -> np.ndarr
 
 def test_for_unequal_errors_the_weighted_line_beats_the_papers_and_the_orthogonal():
     left = {"paper": [], "orthogonal": [], "weighted": []}
-    for seed in range(100):
+    for seed in range(40):
         covariances = uneven(seed)
         centres = drawn(STEEP, covariances, seed)
         left["paper"].append(angle_deg(quick(centres), STEEP))

@@ -35,7 +35,7 @@ def test_the_answer_does_not_depend_on_where_the_nose_points():
 
 
 def test_the_scatter_over_repetitions_is_within_the_stated_error():
-    found = [fit(Swept(seed=s).problem(), "sweep") for s in range(30)]
+    found = [fit(Swept(seed=s).problem(), "sweep") for s in range(16)]
     error = np.array([f.interference - INTERFERENCE for f in found])
     stated = np.mean([np.diag(f.covariance)[MOTOR] for f in found], axis=0)
     assert np.all(np.mean(error**2, axis=0) < 1.5 * stated)

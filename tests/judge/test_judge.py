@@ -15,6 +15,7 @@ from magcomp.errors import MissingDataError
 from magcomp.fit import fit, folds
 from magcomp.geometry import body_from_earth, heading, wrap_angle
 from magcomp.judge import evidence, heading_errors, judge, judge_present, largest_shift
+from magcomp.judge.heading_error import attitudes
 from magcomp.judge.present import _error as error_of_level
 from magcomp.model import (
     CORRECTION_SIZE,
@@ -26,6 +27,8 @@ from magcomp.model import (
     Recording,
     Series,
     Verdict,
+    pack,
+    unpack,
 )
 
 
@@ -156,16 +159,34 @@ def test_the_error_before_is_the_error_of_what_was_in_force_against_the_fit():
     assert growth[-1] >= least - 0.5
 
 
-def test_the_bound_holds_in_at_least_nineteen_of_twenty_flights():
+def test_nineteen_of_twenty_corrections_that_the_doubt_allows_are_within_the_bound():
+    """Drawn from the covariance and turned into degrees exactly, without slopes."""
+    problem = Flown(seed=3, seconds=60.0).problem()
+    found, _ = judge(problem, fit(problem, "flight"))
+    grid = np.arange(0.0, 60.0, 10.0)
+    rng = np.random.default_rng(3)
+    bound = {row.u: row.p95 for row in heading_errors(found, found.correction, grid, rng)}
+    roll, pitch, yaw = attitudes()
+    level = np.sqrt(found.strength**2 - found.vertical**2)
+    field = body_from_earth(roll, pitch, yaw) @ np.array([level, 0.0, found.vertical])
+    drawn = rng.multivariate_normal(pack(found.correction), found.covariance, size=600)
+    for u in (0.0, 20.0, 40.0):
+        amperes = np.full(len(field), u)
+        raw = found.correction.undo(field, amperes)
+        within = [
+            largest_shift(unpack(one).apply(raw, amperes), field, roll, pitch) <= bound[u]
+            for one in drawn
+        ]
+        # The quantile of 400 draws and the count of 600 are good to 1.1 and 0.9 per cent.
+        assert 0.91 < np.mean(within) < 0.985
+
+
+def test_the_bound_holds_in_flight():
     """Against the exact correction, at the ends and the middle of the currents flown."""
-    held, asked = 0, 0
-    for seed in range(20):
-        found, verdict = judged(Flown(seed=seed, seconds=120.0).recording())
+    for seed in range(6):
+        found, verdict = judged(Flown(seed=seed, seconds=60.0).recording(), "flight")
         for row in verdict.heading_error[:5:2]:
-            asked += 1
-            held += _true_error(found.correction, row.u) <= row.p95
-    # Three rows of a flight stand or fall together; 20 flights at 95 % miss more than 3 in 1.6 %.
-    assert held >= asked - 9
+            assert _true_error(found.correction, row.u) <= row.p95
 
 
 def _true_error(correction: Correction, u: float) -> float:

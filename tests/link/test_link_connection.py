@@ -32,7 +32,7 @@ from magcomp.link.transport import TransportClosedError
 from magcomp.link.udp import UdpTransport
 
 CLOCK = SystemClock()
-PATIENCE_S = 10.0
+PATIENCE_S = 60.0
 
 
 class Sink:

@@ -6,6 +6,7 @@ import random
 from pathlib import Path
 
 import pytest
+from effort import examples
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from link_vehicle import FakeVehicle, play
@@ -110,7 +111,7 @@ def test_a_hundred_thousand_random_and_damaged_frames_do_no_harm(recorded, strea
     buffer.coverage()
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=examples(60), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(
     st.lists(st.one_of(st.binary(max_size=300), st.integers(0, 2**32)), max_size=30),
     st.sampled_from([None, bytes(32)]),
@@ -128,7 +129,7 @@ def test_any_bytes_in_any_pieces_do_no_harm(pieces, key, system):
     assert_planned(state.due(now + 10))
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(70), deadline=None)
 @given(st.integers(0, 2**32), st.integers(0, 60))
 def test_any_content_of_an_answer_is_an_identity(seed, length):
     vehicle, state = FakeVehicle(), LinkState(system=1)

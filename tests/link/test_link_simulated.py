@@ -17,7 +17,7 @@ from magcomp.sources import read_tlog
 
 KEY = bytes(range(32))
 DEVICE_IDS = (97539, 131874, 263178)
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0
 
 
 @contextlib.contextmanager

@@ -35,8 +35,8 @@ def heading_error_left(truth, compass, parameters):
 @pytest.mark.parametrize(
     ("program", "seed", "compensation", "promised_deg"),
     [
-        ("turntable_paper", 31, "off", 0.2),
-        ("flight", 31, "off", 0.4),
+        pytest.param("turntable_paper", 31, "off", 0.2, marks=pytest.mark.slow),
+        pytest.param("flight", 31, "off", 0.4, marks=pytest.mark.slow),
         ("flight", 32, "wrong", 0.4),
     ],
 )

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from effort import examples
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -363,7 +364,7 @@ class TestSigning:
 
 
 class TestWhatIsNotMavlink:
-    @settings(max_examples=300, deadline=None)
+    @settings(max_examples=examples(100), deadline=None)
     @given(st.binary(max_size=300))
     def test_any_bytes_are_taken_without_a_word(self, data):
         vehicle = self.vehicle()
@@ -372,7 +373,7 @@ class TestWhatIsNotMavlink:
             vehicle.receive(frame, 0.0)
         assert dict(vehicle.parameters) == before
 
-    @settings(max_examples=300, deadline=None)
+    @settings(max_examples=examples(100), deadline=None)
     @given(st.integers(0, 300), st.integers(0, 255), st.binary(max_size=3))
     def test_a_damaged_set_changes_nothing(self, place, value, junk):
         sound = Asker().pack(mavlink.MAVLink_param_set_message(1, 1, b"COMPASS_MOT_X", 7.0, 9))
@@ -384,7 +385,7 @@ class TestWhatIsNotMavlink:
             vehicle.receive(frame, 0.0)
         assert vehicle.parameters["COMPASS_MOT_X"] == 0.0
 
-    @settings(max_examples=200, deadline=None)
+    @settings(max_examples=examples(70), deadline=None)
     @given(data=st.data())
     def test_no_parameter_value_brings_it_down(self, data):
         vehicle, asker = Vehicle(scenario("sweep", 1)), Asker()

@@ -82,7 +82,7 @@ def test_wherever_the_link_dies_or_the_vehicle_reboots_no_half_calibration_is_in
 ):
     _, messages, _ = written(parked(), Faults(), tmp_path)
     assert messages > 100
-    for number in range(1, messages + 1, 9):
+    for number in range(1, messages + 1, 23):
         vehicle = parked()
         old, new = held(vehicle), dict(wanted_of(vehicle).values)
         folder = tmp_path / str(number)

@@ -28,7 +28,14 @@ def by_pymavlink(path: Path) -> tuple[int, dict[str, list[Any]]]:
     return total, messages
 
 
-@pytest.mark.parametrize("path", [*RECORDINGS, *REAL], ids=lambda path: path.stem)
+QUICK = ("flight_low_rate", "sweep_throttle_only", "quad_2013")
+EACH = [
+    pytest.param(path, marks=() if path.stem in QUICK else pytest.mark.slow)
+    for path in (*RECORDINGS, *REAL)
+]
+
+
+@pytest.mark.parametrize("path", EACH, ids=lambda path: path.stem)
 def test_every_field_of_every_wanted_message_is_the_same(path: Path) -> None:
     total, expected = by_pymavlink(path)
     with mapped(path) as data:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from effort import examples
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tlog_writer import START_US, Sender, log, record, short_flight
@@ -112,14 +113,14 @@ def test_a_log_cut_anywhere_in_its_last_two_frames_is_read_without_them() -> Non
         assert report.skipped == (-cut % last if cut <= last else last + before - cut)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=examples(100), deadline=None)
 @given(st.binary(max_size=400))
 def test_arbitrary_bytes_are_refused_in_words(data: bytes) -> None:
     with pytest.raises(LogError):
         recording_from_bytes(data, "test.tlog")
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(70), deadline=None)
 @given(
     st.lists(
         st.tuples(st.sampled_from(range(48)), st.binary(max_size=12), st.integers(0, 400)),

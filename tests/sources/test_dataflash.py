@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from dataflash_writer import ATT, BAT, CTUN, FMT, HEAD, MAG, MSG, PARM, Form, Writer, short_flight
+from effort import examples
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink import DFReader
@@ -45,7 +46,13 @@ def from_bytes(folder: Path, data: bytes) -> Recording:
 # ---------------------------------------------------------------- against pymavlink
 
 
-@pytest.mark.parametrize("path", [*BINARY_LOGS, *TEXT_LOGS], ids=lambda path: path.stem)
+EACH = [
+    pytest.param(path, marks=() if path in (FLIGHT, *BINARY_LOGS[-1:]) else pytest.mark.slow)
+    for path in (*BINARY_LOGS, *TEXT_LOGS)
+]
+
+
+@pytest.mark.parametrize("path", EACH, ids=lambda path: path.stem)
 def test_every_column_of_every_wanted_message_is_what_pymavlink_reads(path: Path) -> None:
     ours = taken_apart(path).tables
     theirs: dict[str, list[list[object]]] = {}
@@ -365,7 +372,7 @@ def read_or_refused(path: Path) -> None:
             assert np.isfinite(series.value).all()
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 @given(data=hostile())
 def test_a_hostile_log_is_read_or_refused_in_words(tmp_path_factory, data: bytes) -> None:
     path = tmp_path_factory.mktemp("hostile") / "log.BIN"
@@ -373,7 +380,7 @@ def test_a_hostile_log_is_read_or_refused_in_words(tmp_path_factory, data: bytes
     read_or_refused(path)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=examples(50), deadline=None)
 @given(data=st.data())
 def test_a_hostile_text_log_is_read_or_refused_in_words(tmp_path_factory, data) -> None:
     lines = short_flight(1.0).text().split(b"\r\n")

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from dataflash_writer import short_flight as short_flight_of_dataflash
+from effort import examples
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tlog_writer import RECORDINGS, Sender, log, short_flight
@@ -274,7 +275,7 @@ def packed(kind: str) -> bytes:
 
 
 @pytest.mark.parametrize("kind", ["zip", "gz"])
-@settings(max_examples=150)
+@settings(max_examples=examples(60))
 @given(data=st.data())
 def test_a_damaged_archive_is_read_or_refused_in_words(
     tmp_path_factory: pytest.TempPathFactory, kind: str, data: st.DataObject

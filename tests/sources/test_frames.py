@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from effort import examples
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.generator.mavcrc import x25crc
@@ -60,7 +61,7 @@ garbage = st.one_of(
 )
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=examples(100), deadline=None)
 @given(st.lists(st.tuples(garbage, sound_frames()), max_size=12), garbage)
 def test_every_sound_frame_is_found_between_any_garbage(
     pieces: list[tuple[bytes, bytes]], tail: bytes
@@ -73,7 +74,7 @@ def test_every_sound_frame_is_found_between_any_garbage(
     assert found.frames.arrival.tolist() == [START_US + n for n in range(len(pieces))]
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(70), deadline=None)
 @given(
     st.lists(st.one_of(garbage, sound_frames().map(lambda f: record(START_US, f))), max_size=20),
     st.integers(1, 400),
@@ -87,7 +88,7 @@ def test_the_size_of_the_search_window_makes_no_difference(
     assert (parts.verified, parts.skipped) == (whole.verified, whole.skipped)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=examples(50), deadline=None)
 @given(st.binary(min_size=1, max_size=600), st.data())
 def test_checksums_are_those_of_mavlink(data: bytes, draw: st.DataObject) -> None:
     spans = draw.draw(

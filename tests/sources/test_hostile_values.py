@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from effort import examples
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -50,7 +51,7 @@ def hostile(draw: st.DrawFn) -> tuple[int, bytes]:
 times = st.one_of(st.just(0), st.integers(0, 1 << 60), st.integers(START_US, START_US + 10**9))
 
 
-@settings(max_examples=400)
+@settings(max_examples=examples(120))
 @given(st.lists(st.tuples(times, hostile()), max_size=40))
 def test_any_values_are_read_without_a_warning_or_refused_in_words(
     said: list[tuple[int, tuple[int, bytes]]],

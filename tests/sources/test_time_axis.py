@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from effort import examples
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tlog_writer import SECOND, START_US, Sender, log, record
@@ -285,7 +286,7 @@ def test_an_old_position_does_not_draw_its_neighbours_back() -> None:
     assert recording.position.time == pytest.approx(attitude(recording).time - 0.2)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(70), deadline=None)
 @given(
     st.lists(
         st.tuples(

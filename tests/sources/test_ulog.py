@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import px4_truth
 import pytest
+from effort import examples
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pyulog import ULog
@@ -340,7 +341,7 @@ LIES = [
     date=st.sampled_from(["2024-03-01/06_46_06", "2024-99-01/06_46_06", "0000-03-01/99_99_99"]),
     kind=st.sampled_from([2, float("nan"), float("inf"), -1.5]),
 )
-@settings(max_examples=80, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=examples(40), suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_a_log_that_lies_about_what_it_holds_raises_what_is_ours(
     tmp_path: Path, lies, release, date, kind
 ) -> None:
@@ -369,7 +370,7 @@ def changed(data: bytes, edits: list[tuple[str, int, int]]) -> bytes:
     return data
 
 
-@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=examples(60), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(edits=changes)
 def test_no_damage_raises_what_is_not_ours(tmp_path: Path, capsys, edits) -> None:
     survives(tmp_path / "bad.ulg", changed(WHOLE, edits))

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from effort import examples
 from fake_autopilot import (
     DEVICES,
     INT8,
@@ -344,7 +345,7 @@ def test_a_journal_that_cannot_be_written_rolls_back(
 FAULTS = ("reboot", "lossy", "cut", "mend", "interrupt")
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(40), deadline=None)
 @given(
     seed=st.integers(0, 2**32),
     loss=st.sampled_from([0.0, 0.1, 0.3]),

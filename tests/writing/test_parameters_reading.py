@@ -45,7 +45,7 @@ def test_the_whole_list_comes_in_order_and_progress_is_told() -> None:
     assert [event.done for event in told] == sorted(event.done for event in told)
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(6))
 def test_the_whole_list_survives_thirty_per_cent_loss_each_way(seed: int) -> None:
     network = Network(0.3, 0.1, latency=0.2, jitter=0.3, seed=seed)
     autopilot, link, clock = linked(network)
@@ -88,7 +88,7 @@ def test_an_echo_renews_a_value_and_fills_no_place() -> None:
     assert reader.values == {"A": 5.0, "B": 2.0}
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(6))
 def test_named_parameters_are_read_and_unknown_ones_are_missing(seed: int) -> None:
     _, link, clock = linked(Network(loss=0.3, latency=0.1, seed=seed))
     values = fetch(link, QUAD, [*OLD, "COMPASS_MOT4_X"], clock=clock)
