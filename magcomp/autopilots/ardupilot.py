@@ -38,6 +38,7 @@ from magcomp.autopilots.ardupilot_names import (
     suffix,
     vector_names,
 )
+from magcomp.autopilots.motor_test import ArduPilotMotorTest
 from magcomp.autopilots.terms import (
     FieldMeaning,
     Kind,
@@ -120,6 +121,7 @@ class ArduPilot:
     first_slot_leads = True
     first_compass_message = "RAW_IMU"
     storage_s = 1.0  # a queue of writes, each soon, and the memory's lines after it
+    motor_test = ArduPilotMotorTest()
     device_ids_describe = "bus, address and type of a sensor, which are alike in vehicles of a kind"
 
     def require_fittable(self, recording: Recording) -> None:

@@ -10,6 +10,7 @@ import re
 from collections.abc import Collection, Mapping, Sequence
 from typing import Protocol
 
+from magcomp.autopilots.motor_test import MotorTest
 from magcomp.autopilots.terms import FieldMeaning, LagPriors, MotorOutputs, ParameterName
 from magcomp.errors import InputError
 from magcomp.model import (
@@ -93,6 +94,11 @@ class Autopilot(Protocol):
     @property
     def storage_s(self) -> float:
         """Seconds after which a write survives a restart."""
+        ...
+
+    @property
+    def motor_test(self) -> MotorTest:
+        """How motors are spun on the ground."""
         ...
 
     @property

@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from magcomp.autopilots import px4_settings
+from magcomp.autopilots.motor_test import Px4MotorTest
 from magcomp.autopilots.px4_correction import (
     MGAUSS,
     REGRESSOR_OF,
@@ -114,6 +115,7 @@ class Px4:
     first_slot_leads = False
     first_compass_message = "SCALED_IMU"
     storage_s = 2.5  # it saves all at once, 0.3 s after a change and not again for 2 s
+    motor_test = Px4MotorTest()
     device_ids_describe = "bus, address and type of a sensor, which are alike in vehicles of a kind"
 
     def require_fittable(self, recording: Recording) -> None:
