@@ -29,6 +29,7 @@ from magcomp.autopilots.ardupilot_names import (
     ACTING,
     COMPASS_COUNT,
     COMPENSATION_SWITCH,
+    KEPT,
     NUMBERS,
     PER_MOTOR_SWITCH,
     integer_type,
@@ -37,6 +38,7 @@ from magcomp.autopilots.ardupilot_names import (
     suffix,
     vector_names,
 )
+from magcomp.autopilots.motor_test import ArduPilotMotorTest
 from magcomp.autopilots.protocol import (
     FieldMeaning,
     Kind,
@@ -112,10 +114,13 @@ class ArduPilot:
     switch = COMPENSATION_SWITCH
     compass_prefix = "COMPASS_"
     device_id_names = tuple(single_name("DEV_ID", compass) for compass in NUMBERS)
+    log_folder = "APM/LOGS"
+    kept_names = KEPT
     batteries = (0,)
     first_slot_leads = True
     first_compass_message = "RAW_IMU"
     storage_s = 1.0  # a queue of writes, each soon, and the memory's lines after it
+    motor_test = ArduPilotMotorTest()
     device_ids_describe = "bus, address and type of a sensor, which are alike in vehicles of a kind"
 
     def require_fittable(self, recording: Recording) -> None:

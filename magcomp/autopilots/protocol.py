@@ -6,6 +6,7 @@ its compass parameters; it asks the implementation, which :func:`magcomp.autopil
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
@@ -13,6 +14,7 @@ from typing import Protocol
 
 import numpy as np
 
+from magcomp.autopilots.motor_test import MotorTest
 from magcomp.errors import InputError
 from magcomp.model import (
     Compass,
@@ -197,6 +199,16 @@ class Autopilot(Protocol):
         ...
 
     @property
+    def log_folder(self) -> str:
+        """Where on the vehicle's card its logs are."""
+        ...
+
+    @property
+    def kept_names(self) -> re.Pattern[str]:
+        """Parameters whose values the vehicle itself keeps: a write would not last."""
+        ...
+
+    @property
     def first_slot_leads(self) -> bool:
         """Whether the heading comes from the compass of the first slot that is used."""
         ...
@@ -214,6 +226,11 @@ class Autopilot(Protocol):
     @property
     def storage_s(self) -> float:
         """Seconds after which a write survives a restart."""
+        ...
+
+    @property
+    def motor_test(self) -> MotorTest:
+        """How motors are spun on the ground."""
         ...
 
     @property

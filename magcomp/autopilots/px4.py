@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from magcomp.autopilots import px4_settings
+from magcomp.autopilots.motor_test import Px4MotorTest
 from magcomp.autopilots.protocol import (
     FieldMeaning,
     LagPrior,
@@ -36,6 +37,7 @@ from magcomp.autopilots.px4_correction import (
 from magcomp.autopilots.px4_emission import noticed
 from magcomp.autopilots.px4_names import (
     COMPENSATION_SWITCH,
+    KEPT,
     integer_type,
     parse,
     single_name,
@@ -56,6 +58,7 @@ from magcomp.model import (
     Recording,
     Series,
     Vehicle,
+    quantity_of,
 )
 
 FIRST_VERSION = (1, 12)
@@ -104,10 +107,13 @@ class Px4:
     switch = COMPENSATION_SWITCH
     compass_prefix = "CAL_MAG"
     device_id_names = tuple(single_name("ID", number) for number in NUMBERS)
+    log_folder = "log"
+    kept_names = KEPT
     batteries = (0, 1)
     first_slot_leads = False
     first_compass_message = "SCALED_IMU"
     storage_s = 2.5  # it saves all at once, 0.3 s after a change and not again for 2 s
+    motor_test = Px4MotorTest()
     device_ids_describe = "bus, address and type of a sensor, which are alike in vehicles of a kind"
 
     def require_fittable(self, recording: Recording) -> None:
@@ -232,7 +238,7 @@ class Px4:
             wanted = _with_shape(wanted, present)
         made = noticed(wanted, present, offset_zone(values), rotation)
         if usual >= _LEAST_USUAL[regressor]:
-            power = usual if regressor == THROTTLE else usual / MGAUSS
+            power = usual if quantity_of(regressor).is_throttle else usual / MGAUSS
             missed = (made.offset - wanted.offset) / power
             made = replace(made, motor=made.motor + missed)
         found = _vector("COMP", compass, made.motor) | _vector("OFF", compass, made.offset)

@@ -18,7 +18,6 @@ from magcomp.judge.thresholds import Thresholds
 from magcomp.judge.whole import on_constancy, on_earth
 from magcomp.model import (
     CORRECTION_SIZE,
-    CURRENT,
     MOTOR,
     OFFSET,
     Coverage,
@@ -28,6 +27,7 @@ from magcomp.model import (
     HeadingError,
     MotorFit,
     Verdict,
+    quantity_of,
 )
 
 DEFAULT_SEED = 20_240_601
@@ -133,8 +133,8 @@ def _widened(fit: MotorFit, motors: FloatArray) -> MotorFit:
 
 def _floor(fit: MotorFit) -> FloatArray:
     """Standard errors that no residual shows, of the 12 parameters."""
-    bent = fit.regressor != CURRENT and fit.method == "flight"
-    motor = (FLOOR_THROTTLE if bent else FLOOR_MOTOR) * float(np.linalg.norm(fit.correction.motor))
+    bent = not quantity_of(fit.regressor).is_straight and fit.method == "flight"
+    motor = (FLOOR_THROTTLE if bent else FLOOR_MOTOR) * float(np.linalg.norm(fit.correction.vector))
     floor = np.full(CORRECTION_SIZE, FLOOR_SOFT_IRON)
     floor[MOTOR] = motor
     floor[OFFSET] = np.hypot(FLOOR_OFFSET_MGAUSS, motor * fit.u_high / 2.0 if bent else 0.0)
@@ -259,7 +259,7 @@ def error_at(errors: tuple[HeadingError, ...], u: float) -> HeadingError:
 
 
 def _quantity(fit: MotorFit, u: float) -> str:
-    return f"{u:.0f} A" if fit.regressor == CURRENT else f"{u * 100:.0f} % throttle"
+    return quantity_of(fit.regressor).in_sentence(u)
 
 
 def _summary(fit: MotorFit, errors: tuple[HeadingError, ...], residual: FieldResidual) -> str:

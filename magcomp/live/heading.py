@@ -15,7 +15,7 @@ from magcomp.fit.flight import LAG_MEAN_S
 from magcomp.geometry import gravity_direction
 from magcomp.mavlink.header import message_id, source
 from magcomp.mavlink.messages import Message, decode_frame
-from magcomp.model import CURRENT, InForce, Recording, Vehicle
+from magcomp.model import CURRENT, InForce, Recording, Vehicle, quantity_of
 
 _FIELD_MESSAGES = {1: Message.RAW_IMU, 2: Message.SCALED_IMU2, 3: Message.SCALED_IMU3}
 _USED = frozenset((Message.RAW_IMU, Message.ATTITUDE, Message.VFR_HUD, Message.BATTERY_STATUS))
@@ -199,7 +199,7 @@ def _seconds(content: Any) -> float:
 
 def _control(content: Any, message: int, regressor: str) -> float | None:
     """The control quantity, where this message tells it."""
-    if regressor == CURRENT:
+    if not quantity_of(regressor).is_throttle:
         # A second battery's current multiplies nothing; −1 says there is no sensor.
         if message != Message.BATTERY_STATUS or content["id"] or content["current_battery"] < 0:
             return None

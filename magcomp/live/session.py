@@ -36,6 +36,7 @@ from magcomp.live.upload import finish_restore, make_plan, read_backup, wait_dis
 from magcomp.live.watch import LOOK_S, Watch
 from magcomp.model import Analysis, ParameterSet, Recording, Vehicle
 from magcomp.writing.events import Event, Outcome
+from magcomp.writing.files import is_own
 from magcomp.writing.plan import WritePlan
 
 
@@ -283,11 +284,17 @@ class LiveSession:
 
     # ---------------------------------------------------------------- writing
 
-    def upload_plan(self, wanted: ParameterSet, any_vehicle: bool = False) -> WritePlan:
+    def upload_plan(
+        self, wanted: ParameterSet, any_vehicle: bool = False, everything: bool = False
+    ) -> WritePlan:
         """Read the vehicle's calibration and compare; see ``session.upload.make_plan``."""
         with self._asked:
             return make_plan(
-                self.connection, self._known_vehicle(), wanted, any_vehicle=any_vehicle
+                self.connection,
+                self._known_vehicle(),
+                wanted,
+                any_vehicle=any_vehicle,
+                everything=everything,
             )
 
     def restore_plan(self, backup: Path, any_vehicle: bool = False) -> WritePlan:
@@ -298,7 +305,8 @@ class LiveSession:
         ParameterFileError
             The backup is missing or none; otherwise as ``upload_plan``.
         """
-        return self.upload_plan(read_backup(backup)[0], any_vehicle)
+        wanted = read_backup(backup)[0]
+        return self.upload_plan(wanted, any_vehicle, everything=is_own(wanted))
 
     def upload(
         self,

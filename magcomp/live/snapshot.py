@@ -19,7 +19,7 @@ from magcomp.live.latest import Now, Vector
 from magcomp.live.progress import Bound
 from magcomp.live.refit import Refit
 from magcomp.live.situation import Situation
-from magcomp.model import THROTTLE, Analysis, Grade, InForce, MotorFit, Series, Vehicle
+from magcomp.model import Analysis, Grade, InForce, MotorFit, Series, Vehicle, quantity_of
 
 _PLAUSIBLE = (150.0, 900.0)
 """mGauss: the earth's field is 220 … 670; motors and a bad calibration add to it."""
@@ -190,7 +190,7 @@ def compasses_now(
 
 def _applied(raw: Vector, now: Now, present: InForce) -> Vector | None:
     """What the vehicle makes of a sensor's own field."""
-    u = now.throttle if present.regressor == THROTTLE else now.current
+    u = _control(present.regressor, now)
     if u is None and present.correction.motor.any():
         return None
     x, y, z = present.correction.apply(np.array([raw]), np.array([u or 0.0]))[0].tolist()
@@ -222,13 +222,17 @@ def _compass_now(
 
 def _corrected(field: Vector, now: Now, present: InForce, fit: MotorFit) -> Vector | None:
     """Undo the correction in force and apply the fitted one."""
-    u_present = now.throttle if present.regressor == THROTTLE else now.current
-    u_new = now.throttle if fit.regressor == THROTTLE else now.current
+    u_present, u_new = _control(present.regressor, now), _control(fit.regressor, now)
     if u_new is None or (u_present is None and present.correction.motor.any()):
         return None
     raw = present.correction.undo(np.array([field]), np.array([u_present or 0.0]))
     x, y, z = fit.correction.apply(raw, np.array([u_new]))[0].tolist()
     return x, y, z
+
+
+def _control(regressor: str | None, now: Now) -> float | None:
+    """What the vehicle says of a control quantity."""
+    return quantity_of(regressor).of(current=now.current, throttle=now.throttle)
 
 
 def _heading_deg(field: Vector, now: Now) -> float | None:

@@ -81,7 +81,7 @@ def _play(fit: MotorFit, quantity: Quantity, u: list[Moment]) -> dict[str, Any]:
         "slope": rounded(slope / quantity.scale, 5),
         "offset": rounded(correction.offset, 3),
         "soft_iron": rounded(correction.soft_iron, 5),
-        "motor": rounded(correction.motor / quantity.scale, 5),
+        "motor": rounded(correction.vector / quantity.scale, 5),
     }
 
 
