@@ -8,7 +8,16 @@ from dataclasses import replace
 import numpy as np
 
 from magcomp.errors import FitRejectedError, MissingDataError, UsageError
-from magcomp.fit.field_model import FIELD_LAG, REGRESSOR_LAG, SIZE, STRENGTH, lags_of, vertical_of
+from magcomp.fit.field_model import (
+    FIELD_LAG,
+    REGRESSOR_LAG,
+    SIZE,
+    STRENGTH,
+    correction_at,
+    indices_of_correction,
+    lags_of,
+    vertical_of,
+)
 from magcomp.fit.flight import (
     GROUPS,
     FlightEstimate,
@@ -34,7 +43,6 @@ from magcomp.model import (
     MotorFit,
     Readings,
     pack,
-    unpack,
 )
 
 METHODS = ("auto", "sweep", "levels", "flight")
@@ -140,11 +148,13 @@ def refit(problem: Problem, fit: MotorFit, keep: BoolArray) -> MotorFit:
             return fit
         again = fit_levels(part, rows, level)[0]
         return replace(again, lags=fit.lags, lags_std=fit.lags_std, vertical=fit.vertical)
+    packed = pack(fit.correction)
     start = np.concatenate(
         [
-            pack(fit.correction),
+            packed[:CORRECTION_SIZE],
             [fit.strength, fit.vertical / fit.strength, fit.lags.field, fit.lags.regressor],
             np.zeros(SIZE - CORRECTION_SIZE - 4),
+            packed[CORRECTION_SIZE:],
         ]
     )
     return _updated(fit, near(part, _groups(fit), start))
@@ -164,6 +174,7 @@ def fit_flight(problem: Problem) -> MotorFit:
     samples = problem.sample(lags)
     std = np.sqrt(np.diag(found.covariance))
     correction = correction_of(found)
+    among = indices_of_correction(len(found.parameters))
     bare = MotorFit(
         compass=samples.compass,
         method="flight",
@@ -171,7 +182,7 @@ def fit_flight(problem: Problem) -> MotorFit:
         regressor=problem.control.kind,
         origin=problem.control.origin,
         correction=correction,
-        covariance=found.covariance[:CORRECTION_SIZE, :CORRECTION_SIZE],
+        covariance=found.covariance[np.ix_(among, among)],
         free=frozenset(GROUPS[:free]),
         lags=lags,
         lags_std=Lags(float(std[FIELD_LAG]), float(std[REGRESSOR_LAG])),
@@ -180,8 +191,8 @@ def fit_flight(problem: Problem) -> MotorFit:
         noise=float(np.sqrt(np.mean(found.noise**2))),
         levels=(),
         line=None,
-        u_low=float(np.quantile(samples.u, 0.02)),
-        u_high=float(np.quantile(samples.u, 0.98)),
+        u_low=float(np.quantile(samples.total, 0.02)),
+        u_high=float(np.quantile(samples.total, 0.98)),
         count=len(samples),
     )
     centres = centres_of_flight(samples, correction, (bare.strength, bare.vertical), bare.noise)
@@ -298,7 +309,7 @@ def _groups(fit: MotorFit) -> int:
 def _updated(fit: MotorFit, parameters: FloatArray) -> MotorFit:
     return replace(
         fit,
-        correction=unpack(parameters[:CORRECTION_SIZE]),
+        correction=correction_at(parameters),
         strength=float(parameters[STRENGTH]),
         vertical=vertical_of(parameters),
     )

@@ -7,13 +7,13 @@ import numpy as np
 from magcomp.geometry import body_from_earth, heading_shift, level_matrix, wrap_angle
 from magcomp.model import (
     CORRECTION_SIZE,
-    CURRENT,
     OFFSET,
     SOFT_IRON,
     Correction,
     FloatArray,
     HeadingError,
     MotorFit,
+    quantity_of,
     symmetric,
 )
 
@@ -22,9 +22,6 @@ TILT_RAD = np.radians(20.0)
 
 _YAWS = np.radians(np.arange(0.0, 360.0, 10.0))
 _DRAWS = 400
-_MOST_ROWS = 50
-_CURRENTS = (0.0, 10.0, 20.0, 30.0, 40.0, 50.0)
-_THROTTLES = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
 
 
 def attitudes() -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -36,13 +33,7 @@ def attitudes() -> tuple[FloatArray, FloatArray, FloatArray]:
 
 def control_grid(fit: MotorFit) -> FloatArray:
     """Control quantities a table of heading errors is given at."""
-    grid = _CURRENTS if fit.regressor == CURRENT else _THROTTLES
-    step = grid[1]
-    if fit.regressor == CURRENT and fit.u_high > grid[-1] + step / 2:
-        # A monitor that claims a million amperes gets no million rows.
-        step *= max(1.0, np.ceil(fit.u_high / (step * _MOST_ROWS)))
-        return np.arange(0.0, fit.u_high + step / 2, step)
-    return np.array(grid)
+    return quantity_of(fit.regressor).rows(fit.u_high)
 
 
 def heading_errors(
@@ -62,7 +53,7 @@ def heading_errors(
     present
         The correction in force.
     present_u
-        What ``present.motor`` is multiplied by at each control quantity of
+        What ``present``'s motor vector is multiplied by at each control quantity of
         :func:`control_grid`, shape (k,).
     rng
         For the draws from the covariance.
@@ -84,7 +75,7 @@ def heading_errors(
     inverse = np.linalg.inv(fit.correction.soft_iron)
     rows = []
     for u, u_present in zip(control_grid(fit), present_u, strict=True):
-        raw = (field - u * fit.correction.motor) @ inverse.T - fit.correction.offset
+        raw = (field - u * fit.correction.vector) @ inverse.T - fit.correction.offset
         before = present.apply(raw, np.full(len(raw), u_present))
         slopes = _shift_slopes(field, raw + fit.correction.offset, roll, pitch, u, fit)
         off = shifts(before, field, roll, pitch)

@@ -19,7 +19,6 @@ from magcomp.judge.thresholds import Thresholds
 from magcomp.judge.whole import on_constancy, on_earth
 from magcomp.model import (
     CORRECTION_SIZE,
-    CURRENT,
     MOTOR,
     OFFSET,
     Coverage,
@@ -30,6 +29,7 @@ from magcomp.model import (
     MotorFit,
     Samples,
     Verdict,
+    quantity_of,
 )
 
 DEFAULT_SEED = 20_240_601
@@ -132,8 +132,8 @@ def _widened(fit: MotorFit, motors: FloatArray) -> MotorFit:
 
 def _floor(fit: MotorFit) -> FloatArray:
     """Standard errors that no residual shows, of the 12 parameters."""
-    bent = fit.regressor != CURRENT and fit.method == "flight"
-    motor = (FLOOR_THROTTLE if bent else FLOOR_MOTOR) * float(np.linalg.norm(fit.correction.motor))
+    bent = not quantity_of(fit.regressor).is_straight and fit.method == "flight"
+    motor = (FLOOR_THROTTLE if bent else FLOOR_MOTOR) * float(np.linalg.norm(fit.correction.vector))
     floor = np.full(CORRECTION_SIZE, FLOOR_SOFT_IRON)
     floor[MOTOR] = motor
     floor[OFFSET] = np.hypot(FLOOR_OFFSET_MGAUSS, motor * fit.u_high / 2.0 if bent else 0.0)
@@ -147,7 +147,7 @@ def _present_control(problem: Problem, samples: Samples, fit: MotorFit) -> Float
     if kind in (None, fit.regressor) or kind not in problem.in_force:
         return grid
     other = interpolate(problem.in_force[kind].series, samples.time - samples.lags.regressor)
-    slope, intercept = np.polyfit(samples.u, other, 1)
+    slope, intercept = np.polyfit(samples.total, other, 1)
     return np.asarray(np.maximum(intercept + slope * grid, 0.0))
 
 
@@ -269,7 +269,7 @@ def error_at(errors: tuple[HeadingError, ...], u: float) -> HeadingError:
 
 
 def _quantity(fit: MotorFit, u: float) -> str:
-    return f"{u:.0f} A" if fit.regressor == CURRENT else f"{u * 100:.0f} % throttle"
+    return quantity_of(fit.regressor).in_sentence(u)
 
 
 def _summary(fit: MotorFit, errors: tuple[HeadingError, ...], residual: FieldResidual) -> str:

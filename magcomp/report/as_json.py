@@ -16,7 +16,6 @@ import numpy as np
 from magcomp import __version__
 from magcomp.judge.judge import error_at
 from magcomp.model import (
-    UNITS,
     Analysis,
     CompassResult,
     Coverage,
@@ -26,6 +25,7 @@ from magcomp.model import (
     Recording,
     Vehicle,
     Verdict,
+    quantity_of,
 )
 
 
@@ -59,7 +59,7 @@ def check_object(
             {
                 "compass": compass,
                 "regressor": regressor,
-                "unit": UNITS[regressor],
+                "unit": quantity_of(regressor).unit,
                 "heading_error_deg": [
                     {"u": row.u, "in_force": row.before, "p95": row.p95}
                     for row in verdict.heading_error
@@ -112,7 +112,7 @@ def _compass(result: CompassResult) -> dict[str, Any]:
         "method": fit.method,
         "why": fit.why,
         "regressor": fit.regressor,
-        "unit": UNITS[fit.regressor],
+        "unit": quantity_of(fit.regressor).unit,
         "origin": fit.origin,
         "interference_mgauss": fit.interference,
         "std_mgauss": fit.interference_std,

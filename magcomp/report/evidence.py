@@ -129,7 +129,7 @@ def compass_plots(
     return CompassPlots(
         compass=fit.compass,
         time=samples.time[keep],
-        u=samples.u[keep],
+        u=samples.total[keep],
         raw=samples.raw[keep],
         parts=parts,
         before=before[keep],
@@ -207,10 +207,10 @@ def _sphere(corrected: FloatArray) -> IntArray:
 
 def _turn(samples: Samples, corrected: FloatArray) -> tuple[IntArray, FloatArray]:
     yaw = heading(corrected, samples.attitude[:, 0], samples.attitude[:, 1])
-    low, high = float(samples.u.min()), float(samples.u.max())
+    low, high = float(samples.total.min()), float(samples.total.max())
     edges = np.linspace(low, high if high > low else low + 1.0, CONTROL_BANDS + 1)
     counts, _, _ = np.histogram2d(
-        samples.u,
+        samples.total,
         np.mod(yaw, 2 * np.pi),
         bins=(edges, np.linspace(0.0, 2 * np.pi, TURN_SECTORS + 1)),
     )

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from magcomp.model import CURRENT
+from magcomp.model import quantity_of as known_quantity
 from magcomp.report import words
 
 BEFORE, AFTER, INK, MUTED, GRID, SCALE = "@before", "@after", "@ink", "@muted", "@grid", "@scale"
@@ -80,9 +80,8 @@ class Quantity:
 
 def quantity_of(regressor: str) -> Quantity:
     """The control quantity of a fit."""
-    if regressor == CURRENT:
-        return Quantity("current", "A", 1.0)
-    return Quantity("throttle", "%", 100.0)
+    known = known_quantity(regressor)
+    return Quantity(known.name, known.shown_unit, known.scale)
 
 
 def shade(share: float) -> str:

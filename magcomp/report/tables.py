@@ -12,7 +12,7 @@ from rich.text import Text
 
 from magcomp import autopilots
 from magcomp.autopilots import Kind
-from magcomp.model import CURRENT, CompassResult, MotorFit, Verdict
+from magcomp.model import CompassResult, MotorFit, Verdict, quantity_of
 from magcomp.report import words
 from magcomp.report.by_width import ByWidth
 
@@ -202,7 +202,7 @@ def _levels(result: CompassResult, *, is_wide: bool) -> Table:
         table.add_column(Text("readings", style="dim"), justify="right", min_width=9)
     for level in fit.levels:
         std = np.sqrt(np.diag(level.covariance))
-        u = f"{level.u:.1f} A" if fit.regressor == CURRENT else f"{100 * level.u:.1f} %"
+        u = quantity_of(fit.regressor).precise(level.u)
         centre = [
             words.with_std(float(c), float(s)) for c, s in zip(level.centre, std, strict=True)
         ]

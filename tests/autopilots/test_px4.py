@@ -169,7 +169,7 @@ def test_what_is_written_is_what_the_firmware_applies(
     # What the firmware would not notice is moved by less than its dead zones.
     assert np.allclose(applied.soft_iron, correction.soft_iron, atol=0.011)
     assert np.abs(applied.offset - correction.offset).max() < 11.0
-    assert np.allclose(applied.motor, correction.motor, atol=2e-5)
+    assert np.allclose(applied.vector, correction.vector, atol=2e-5)
 
 
 @given(st.tuples(*[st.floats(-0.012, 0.012)] * 3).map(np.array), st.booleans(), rotations)
@@ -317,7 +317,7 @@ def test_the_switch_acts_in_flight():
 def test_a_switch_that_the_firmware_does_not_know_is_off_and_told(value):
     values = held(1, CAL_MAG_COMP_TYP=value, COMP=(3.0, 0.0, 0.0))
     assert PX4.regressor(values) is None
-    assert not PX4.in_force(values, 1).correction.motor.any()
+    assert not PX4.in_force(values, 1).correction.vector.any()
     assert "which the vehicle takes for 0, off" in PX4.warnings(values)[0]
 
 
