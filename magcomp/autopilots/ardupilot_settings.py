@@ -23,7 +23,7 @@ from magcomp.autopilots.ardupilot_names import (
     single_name,
     vector_names,
 )
-from magcomp.autopilots.protocol import Kind
+from magcomp.autopilots.terms import Kind
 from magcomp.errors import InputError, MissingDataError
 from magcomp.model import Compass, ParameterHistory
 

@@ -10,7 +10,6 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from magcomp.autopilots.protocol import Kind
 from magcomp.autopilots.px4_correction import Compensation, stored
 from magcomp.autopilots.px4_names import (
     BOARD_ANGLES,
@@ -23,6 +22,7 @@ from magcomp.autopilots.px4_names import (
     single_name,
 )
 from magcomp.autopilots.px4_rotation import ROTATIONS, rotation_number
+from magcomp.autopilots.terms import Kind
 from magcomp.errors import InputError, MissingDataError, ParameterFileError
 from magcomp.model import Compass, ParameterHistory
 
