@@ -8,12 +8,11 @@ from functools import partial
 
 import numpy as np
 
-from magcomp.align import interpolate
 from magcomp.fit import Problem
 from magcomp.judge.evidence import cover, field_residual, used_lags
 from magcomp.judge.finding import Finding, severity
 from magcomp.judge.gates import on_control, on_turn, on_unseen_parameters
-from magcomp.judge.heading_error import control_grid, heading_errors
+from magcomp.judge.heading_error import control_grid, heading_errors, multiplied_in_force
 from magcomp.judge.keep import is_close, keep
 from magcomp.judge.thresholds import Thresholds
 from magcomp.judge.whole import on_constancy, on_earth
@@ -27,7 +26,6 @@ from magcomp.model import (
     Grade,
     HeadingError,
     MotorFit,
-    Samples,
     Verdict,
     quantity_of,
 )
@@ -84,7 +82,10 @@ def judge(
     fit = _widened(fit, motors)
     in_force = problem.readings.in_force[-1]
     table = partial(
-        heading_errors, fit, in_force.correction, _present_control(problem, samples, fit)
+        heading_errors,
+        fit,
+        in_force.correction,
+        multiplied_in_force(control_grid(fit), in_force.regressor, fit, problem.in_force, samples),
     )
     errors = table(rng)
     stays = in_force.regressor in (None, fit.regressor) and is_close(
@@ -138,17 +139,6 @@ def _floor(fit: MotorFit) -> FloatArray:
     floor[MOTOR] = motor
     floor[OFFSET] = np.hypot(FLOOR_OFFSET_MGAUSS, motor * fit.u_high / 2.0 if bent else 0.0)
     return floor
-
-
-def _present_control(problem: Problem, samples: Samples, fit: MotorFit) -> FloatArray:
-    """What the motor correction in force multiplies at each control quantity of the table."""
-    grid = control_grid(fit)
-    kind = problem.readings.in_force[-1].regressor
-    if kind in (None, fit.regressor) or kind not in problem.in_force:
-        return grid
-    other = interpolate(problem.in_force[kind].series, samples.time - samples.lags.regressor)
-    slope, intercept = np.polyfit(samples.total, other, 1)
-    return np.asarray(np.maximum(intercept + slope * grid, 0.0))
 
 
 def _findings(

@@ -133,7 +133,7 @@ def _compass(result: CompassResult) -> dict[str, Any]:
             {"u": row.u, "before": row.before, "after": row.after, "p95": row.p95}
             for row in verdict.heading_error
         ],
-        "quoted": _quoted(verdict),
+        "quoted": quoted(verdict),
         "coverage": _coverage(verdict.coverage),
         "free": sorted(fit.free),
         "earth_mgauss": {"strength": fit.strength, "vertical": fit.vertical},
@@ -146,7 +146,7 @@ def _compass(result: CompassResult) -> dict[str, Any]:
     }
 
 
-def _quoted(verdict: Verdict) -> dict[str, float | bool]:
+def quoted(verdict: Verdict) -> dict[str, float | bool]:
     """The one row of the heading errors that every sentence and card quotes.
 
     It is the hover's, or the highest control quantity's where only there something is gained.
