@@ -314,10 +314,10 @@ class ArduPilot:
         return tuple(ardupilot_settings.warnings(values))
 
     def write_warnings(
-        self, asked: Mapping[str, float], values: Mapping[str, float]
+        self, asked: Mapping[str, float], held: Mapping[str, float]
     ) -> tuple[str, ...]:
         """Of vectors without their switch."""
-        return tuple(ardupilot_settings.write_warnings(asked, values))
+        return tuple(ardupilot_settings.write_warnings(asked, held))
 
     def multiplied(self, vehicle: Vehicle) -> tuple[str, ...]:
         """The current; in copters and subs, which hand it to the compass, the throttle too."""

@@ -298,7 +298,7 @@ class Autopilot(Protocol):
         ...
 
     def write_warnings(
-        self, asked: Mapping[str, float], values: Mapping[str, float]
+        self, asked: Mapping[str, float], held: Mapping[str, float]
     ) -> tuple[str, ...]:
         """What a pilot must know of a write, beyond :meth:`warnings`.
 
@@ -306,8 +306,8 @@ class Autopilot(Protocol):
         ----------
         asked
             What shall be written.
-        values
-            What the vehicle will hold afterwards.
+        held
+            What the vehicle holds before.
         """
         ...
 

@@ -297,10 +297,10 @@ class Px4:
     def write_warnings(
         self,
         asked: Mapping[str, float],
-        values: Mapping[str, float],
+        held: Mapping[str, float],
     ) -> tuple[str, ...]:
         """Of vectors without their switch, and of a restart."""
-        return tuple(px4_settings.write_warnings(asked, values))
+        return tuple(px4_settings.write_warnings(asked, held))
 
     def multiplied(self, vehicle: Vehicle) -> tuple[str, ...]:  # noqa: ARG002
         """Thrust and current, whatever the vehicle."""

@@ -38,6 +38,9 @@ COMMANDS = {
     "calibrate": _Command(
         "magcomp.cli.calibrate", "Guide, record and fit a live vehicle; write the answer to it."
     ),
+    "sweep": _Command(
+        "magcomp.cli.sweep", "Spin the motors on the ground, step by step; fit and write."
+    ),
     "record": _Command("magcomp.cli.record", "Record a live vehicle into a .tlog."),
     "upload": _Command("magcomp.cli.upload", "Write a parameter file to a vehicle, and prove it."),
     "restore": _Command("magcomp.cli.restore", "Bring a vehicle back to a backup."),
