@@ -8,7 +8,15 @@ from dataclasses import replace
 import numpy as np
 
 from magcomp.errors import FitRejectedError, MissingDataError, UsageError
-from magcomp.fit.field_model import FIELD_LAG, REGRESSOR_LAG, SIZE, STRENGTH, lags_of, vertical_of
+from magcomp.fit.field_model import (
+    FIELD_LAG,
+    REGRESSOR_LAG,
+    SIZE,
+    STRENGTH,
+    errors_of,
+    lags_of,
+    vertical_of,
+)
 from magcomp.fit.flight import (
     GROUPS,
     FlightEstimate,
@@ -27,6 +35,7 @@ from magcomp.fit.robust import Estimate
 from magcomp.fit.sweep import fit_sweep, is_still
 from magcomp.model import (
     CORRECTION_SIZE,
+    MOTOR,
     OFFSET,
     BoolArray,
     FloatArray,
@@ -140,14 +149,18 @@ def refit(problem: Problem, fit: MotorFit, keep: BoolArray) -> MotorFit:
             return fit
         again = fit_levels(part, rows, level)[0]
         return replace(again, lags=fit.lags, lags_std=fit.lags_std, vertical=fit.vertical)
-    start = np.concatenate(
+    return _updated(fit, near(part, _groups(fit), _parameters_of(fit)))
+
+
+def _parameters_of(fit: MotorFit) -> FloatArray:
+    """The parameters of a flight's fit, shape (SIZE,), with nothing said of tilt and lean."""
+    return np.concatenate(
         [
             pack(fit.correction),
             [fit.strength, fit.vertical / fit.strength, fit.lags.field, fit.lags.regressor],
             np.zeros(SIZE - CORRECTION_SIZE - 4),
         ]
     )
-    return _updated(fit, near(part, _groups(fit), start))
 
 
 def _with_lags(problem: Problem, fit: MotorFit) -> MotorFit:
@@ -160,17 +173,49 @@ def _with_lags(problem: Problem, fit: MotorFit) -> MotorFit:
 def fit_flight(problem: Problem) -> MotorFit:
     """Fit a flight, opening as many groups of parameters as the data deserve."""
     found, free = with_wander(problem, *_choose_freedom(problem))
+    bare = _of_flight(problem, found, free)
+    samples = problem.sample(bare.lags)
+    centres = centres_of_flight(
+        samples, bare.correction, (bare.strength, bare.vertical), bare.noise
+    )
+    return with_line(bare, centres)
+
+
+def fit_alike(problem: Problem, fit: MotorFit) -> MotorFit:
+    """A flight against another control quantity with the freedom of a fit that exists.
+
+    To be compared with that fit on held-out readings, at a tenth of the price of a fit of its own:
+    it has no covariance and no centres.
+
+    Parameters
+    ----------
+    problem
+        The other control quantity, and the readings of the fit.
+    fit
+        Of a flight.
+    """
+    free = _groups(fit)
+    begin = _parameters_of(fit)
+    begin[MOTOR] = 0.0
+    found = estimate(problem, free, start=begin, with_covariance=False)
+    errors = errors_of(problem.sample(lags_of(found.parameters)), found.parameters)
+    found = estimate(
+        problem, free, start=found.parameters, errors=errors, with_covariance=False, rounds=_QUICK
+    )
+    return _of_flight(problem, found, free)
+
+
+def _of_flight(problem: Problem, found: FlightEstimate, free: int) -> MotorFit:
     lags = lags_of(found.parameters)
     samples = problem.sample(lags)
     std = np.sqrt(np.diag(found.covariance))
-    correction = correction_of(found)
-    bare = MotorFit(
+    return MotorFit(
         compass=samples.compass,
         method="flight",
         why=_why(free),
         regressor=problem.control.kind,
         origin=problem.control.origin,
-        correction=correction,
+        correction=correction_of(found),
         covariance=found.covariance[:CORRECTION_SIZE, :CORRECTION_SIZE],
         free=frozenset(GROUPS[:free]),
         lags=lags,
@@ -184,8 +229,6 @@ def fit_flight(problem: Problem) -> MotorFit:
         u_high=float(np.quantile(samples.u, 0.98)),
         count=len(samples),
     )
-    centres = centres_of_flight(samples, correction, (bare.strength, bare.vertical), bare.noise)
-    return with_line(bare, centres)
 
 
 def _choose_freedom(problem: Problem) -> tuple[FlightEstimate, int]:
