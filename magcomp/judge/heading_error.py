@@ -8,6 +8,7 @@ from magcomp.geometry import body_from_earth, heading_shift, level_matrix, wrap_
 from magcomp.model import (
     CORRECTION_SIZE,
     CURRENT,
+    MOTOR,
     OFFSET,
     SOFT_IRON,
     Correction,
@@ -98,6 +99,27 @@ def heading_errors(
             )
         )
     return tuple(rows)
+
+
+def variance_shares(fit: MotorFit, u: float) -> dict[str, float]:
+    """Variance of the heading that each group of parameters makes at ``u``, where it is largest.
+
+    Returns
+    -------
+    dict
+        Square radians by ``"motor"``, ``"offset"`` and ``"soft iron"``.
+    """
+    roll, pitch, yaw = attitudes()
+    horizontal = np.sqrt(max(fit.strength**2 - fit.vertical**2, 1.0))
+    field = body_from_earth(roll, pitch, yaw) @ np.array([horizontal, 0.0, fit.vertical])
+    centred = (field - u * fit.correction.motor) @ np.linalg.inv(fit.correction.soft_iron).T
+    slopes = _shift_slopes(field, centred, roll, pitch, u, fit)
+    worst = slopes[int(np.argmax(np.einsum("ki,ij,kj->k", slopes, fit.covariance, slopes)))]
+    groups = {"motor": MOTOR, "offset": OFFSET, "soft iron": SOFT_IRON}
+    return {
+        name: float(worst[part] @ fit.covariance[part, part] @ worst[part])
+        for name, part in groups.items()
+    }
 
 
 def largest_shift(

@@ -11,10 +11,11 @@ import numpy as np
 from magcomp.align import interpolate
 from magcomp.fit import Problem
 from magcomp.judge.evidence import cover, field_residual, used_lags
-from magcomp.judge.finding import Finding, severity
+from magcomp.judge.finding import Finding, quantity, severity
 from magcomp.judge.gates import on_control, on_turn, on_unseen_parameters
 from magcomp.judge.heading_error import control_grid, heading_errors
 from magcomp.judge.keep import is_close, keep
+from magcomp.judge.lacking import lacking
 from magcomp.judge.thresholds import Thresholds
 from magcomp.judge.whole import on_constancy, on_earth
 from magcomp.model import (
@@ -99,7 +100,7 @@ def judge(
         *on_earth(problem, samples, fit),
         *on_constancy(problem, fit, limits),
         *on_unseen_parameters(in_force.unseen),
-        *_findings(fit, errors, residual, covered, limits),
+        *_findings(fit, errors, residual, (samples, covered), limits),
     ]
     grade = max((f.grade for f in findings), key=severity, default=Grade.GOOD)
     fit = keep(fit, in_force.correction) if stays else fit
@@ -155,14 +156,14 @@ def _findings(
     fit: MotorFit,
     errors: tuple[HeadingError, ...],
     residual: FieldResidual,
-    covered: Coverage,
+    seen: tuple[Samples, Coverage],
     limits: Thresholds,
 ) -> Iterator[Finding]:
-    worst = _worst_flown(fit, errors)
+    worst, covered = _worst_flown(fit, errors), seen[1]
     known = worst.p95 <= limits.marginal_deg
     yield from on_control(fit.regressor, covered, limits, known=known)
     yield from _on_unseen(fit, errors, residual, limits)
-    yield from _on_bound(fit, errors, worst, limits)
+    yield from _on_bound(fit, errors, worst, seen, limits)
     yield from _on_shape(fit, residual, covered, limits, known=known)
 
 
@@ -197,8 +198,13 @@ def _fall(residual: FieldResidual) -> float:
 
 
 def _on_bound(
-    fit: MotorFit, errors: tuple[HeadingError, ...], worst: HeadingError, limits: Thresholds
+    fit: MotorFit,
+    errors: tuple[HeadingError, ...],
+    worst: HeadingError,
+    seen: tuple[Samples, Coverage],
+    limits: Thresholds,
 ) -> Iterator[Finding]:
+    samples, covered = seen
     if worst.p95 <= limits.good_deg:
         return
     tolerable = max(limits.marginal_deg, limits.lesser_evil * worst.before)
@@ -214,8 +220,8 @@ def _on_bound(
     grade = Grade.MARGINAL if worst.p95 <= tolerable else Grade.REJECTED
     yield Finding(
         grade,
-        f"the heading could still be wrong by {worst.p95:.1f}° at {_quantity(fit, worst.u)}: "
-        "record longer, turn all the way round and use the whole range of throttle",
+        f"the heading could still be wrong by {worst.p95:.1f}° at "
+        f"{quantity(fit.regressor, worst.u)}: {lacking(fit, samples, covered, worst.u)}",
     )
 
 
@@ -268,13 +274,9 @@ def error_at(errors: tuple[HeadingError, ...], u: float) -> HeadingError:
     return HeadingError(u, before, after, p95)
 
 
-def _quantity(fit: MotorFit, u: float) -> str:
-    return f"{u:.0f} A" if fit.regressor == CURRENT else f"{u * 100:.0f} % throttle"
-
-
 def _summary(fit: MotorFit, errors: tuple[HeadingError, ...], residual: FieldResidual) -> str:
     at_top = error_at(errors, fit.u_high)
-    where = _quantity(fit, at_top.u)
+    where = quantity(fit.regressor, at_top.u)
     unseen = (
         f"on stretches it did not see, the unexplained field goes from "
         f"{residual.held_out_before:.1f} to {residual.held_out:.1f} mGauss"

@@ -14,12 +14,11 @@ from magcomp.fit import (
 )
 from magcomp.geometry import body_from_earth
 from magcomp.judge.evidence import cover
-from magcomp.judge.finding import Finding, severity
+from magcomp.judge.finding import Finding, quantity, severity
 from magcomp.judge.gates import on_control, on_duration, on_turn, on_unseen_parameters
 from magcomp.judge.heading_error import attitudes, largest_shift
 from magcomp.judge.thresholds import Thresholds
 from magcomp.model import (
-    CURRENT,
     Correction,
     FieldResidual,
     FloatArray,
@@ -162,7 +161,7 @@ def _measured(errors: tuple[HeadingError, ...], kind: str, limits: Thresholds) -
             Grade.REJECTED, "the recording is too short to judge the calibration in force"
         )
     worst = max(errors, key=lambda row: row.before)
-    where = f"{worst.u:.0f} A" if kind == CURRENT else f"{worst.u * 100:.0f} % throttle"
+    where = quantity(kind, worst.u)
     found = (
         f"with the calibration in force the heading is wrong by up to {worst.before:.1f}° at "
         f"{where} (at most {worst.p95:.1f}° with 95 %)"
