@@ -106,7 +106,8 @@ def fit(problem: Problem, method: str = "auto") -> MotorFit:
         rows, level = usable_levels(problem)
         count = len(np.unique(level))
         if count >= 2 and (method == "levels" or len(rows) > 0.4 * len(samples)):
-            return _with_lags(problem, fit_levels(problem, rows, level)[0])
+            found = _with_lags(problem, fit_levels(problem, rows, level)[0])
+            return found if method == "levels" else _surer(found, fit_flight(problem))
         if method == "levels":
             raise FitRejectedError(
                 "The method of levels needs turns about all axes at two or more steady levels of "
@@ -161,6 +162,27 @@ def _parameters_of(fit: MotorFit) -> FloatArray:
             np.zeros(SIZE - CORRECTION_SIZE - 4),
         ]
     )
+
+
+def _surer(by_levels: MotorFit, by_flight: MotorFit) -> MotorFit:
+    """Of two fits the one whose centre is better known where it is known least.
+
+    Turns that hardly cover each level leave its ellipsoid's centre free; gravity then tells more.
+    """
+    if _doubt_of_centre(by_levels) <= _doubt_of_centre(by_flight):
+        return by_levels
+    why = "gravity tells more of this log than the turns at steady levels alone"
+    return replace(by_flight, why=f"{why}; {by_flight.why}")
+
+
+def _doubt_of_centre(fit: MotorFit) -> float:
+    """Standard error of the field's shift, mGauss, at rest or at the top, whichever is larger."""
+    of_parameters = fit.covariance[: OFFSET.stop, : OFFSET.stop]
+    doubts = []
+    for u in (0.0, fit.u_high):
+        shift = np.hstack([u * np.eye(3), fit.correction.soft_iron])
+        doubts.append(float(np.sqrt(np.trace(shift @ of_parameters @ shift.T))))
+    return max(doubts)
 
 
 def _with_lags(problem: Problem, fit: MotorFit) -> MotorFit:
