@@ -64,6 +64,9 @@ SHARP_OFFSET = 0.05
 LEAST_SOFT_IRON, MOST_SOFT_IRON = 0.6, 1.6
 """Soft iron of a compass that can be used at all has its eigenvalues between these."""
 
+CERTAIN_MGAUSS = 0.5
+"""A tenth of a degree of heading: which of two centres is known better than this does not matter."""
+
 LEAST_READINGS = 60
 _MOST_FREE = len(GROUPS)
 _QUICK = 2
@@ -169,7 +172,7 @@ def _surer(by_levels: MotorFit, by_flight: MotorFit) -> MotorFit:
 
     Turns that hardly cover each level leave its ellipsoid's centre free; gravity then tells more.
     """
-    if _doubt_of_centre(by_levels) <= _doubt_of_centre(by_flight):
+    if _doubt_of_centre(by_levels) <= max(_doubt_of_centre(by_flight), CERTAIN_MGAUSS):
         return by_levels
     why = "gravity tells more of this log than the turns at steady levels alone"
     return replace(by_flight, why=f"{why}; {by_flight.why}")

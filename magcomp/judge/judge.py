@@ -98,7 +98,7 @@ def judge(
     findings = [
         *(Finding(Grade.REJECTED, complaint) for complaint in complaints),
         *on_earth(problem, samples, fit),
-        *on_constancy(problem, fit, limits),
+        *on_constancy(problem, fit, limits, _worst_flown(fit, errors).p95),
         *on_unseen_parameters(in_force.unseen),
         *_findings(fit, errors, residual, (samples, covered), limits),
     ]
