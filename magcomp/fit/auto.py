@@ -65,7 +65,7 @@ LEAST_SOFT_IRON, MOST_SOFT_IRON = 0.6, 1.6
 """Soft iron of a compass that can be used at all has its eigenvalues between these."""
 
 CERTAIN_MGAUSS = 0.5
-"""A tenth of a degree of heading: which of two centres is known better than this does not matter."""
+"""A tenth of a degree of heading: which of two centres is known better does not matter below."""
 
 LEAST_READINGS = 60
 _MOST_FREE = len(GROUPS)
