@@ -39,9 +39,10 @@ from magcomp.simulate.habits import own_number
 from magcomp.simulate.parameters import DEVICE_IDS
 from magcomp.writing import writer
 from magcomp.writing.events import Outcome, Standing
-from magcomp.writing.files import as_float32, read_parameter_file
+from magcomp.writing.files import read_parameter_file
 from magcomp.writing.journal import read_journal
 from magcomp.writing.plan import plan
+from magcomp.writing.rows import as_float32
 
 SEED = 1
 STORAGE_S = 0.9

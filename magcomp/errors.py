@@ -7,6 +7,7 @@
     │   └── AddressError          2   not a connection string
     ├── InputError                2   a file that cannot be used
     │   ├── LogError              2   a log that is not one, or is cut beyond use
+    │   │   └── NoLogError        2   a file that is not there, or is no log at all
     │   ├── MissingDataError      2   a sound log that lacks what a fit needs
     │   ├── ChooseVehicleError    2   several vehicles in one log, none chosen
     │   ├── ParameterFileError    2   a parameter file that must not be trusted
@@ -59,6 +60,10 @@ class InputError(MagcompError):
 
 class LogError(InputError):
     """A log that is not one, or is damaged beyond use."""
+
+
+class NoLogError(LogError):
+    """A file that is not there, or is no log at all."""
 
 
 class MissingDataError(InputError):

@@ -11,6 +11,9 @@ from hypothesis import settings
 # loaded; programs that tests start inherit it.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+# What is printed has Unicode in it, whatever the locale of the machine that tests.
+os.environ["LC_ALL"] = "C.UTF-8"
+
 # A busy machine is slow, not wrong: no test here is about the time of one example.
 settings.register_profile("magcomp", deadline=None)
 settings.load_profile("magcomp")

@@ -112,7 +112,7 @@ class Flown:
 
     def raw_of(self, true: FloatArray, amperes: FloatArray) -> FloatArray:
         """Sensor field of a true body-axes field, mGauss, shape (n, 3)."""
-        disturbed = true - np.multiply.outer(amperes, self.exact.motor)
+        disturbed = true - np.multiply.outer(amperes, self.exact.vector)
         return disturbed @ np.linalg.inv(self.exact.soft_iron).T - self.exact.offset
 
     def parameters(self) -> dict[str, float]:

@@ -137,7 +137,7 @@ def test_no_correction_sees_the_turns_it_is_measured_on():
     }
     clean = recorded(1).corrections
     other = turntable(replace(recording, field=spoilt), truth)
-    assert other.corrections.fit.correction.motor == pytest.approx(clean.fit.correction.motor)
+    assert other.corrections.fit.correction.vector == pytest.approx(clean.fit.correction.vector)
     assert other.corrections.feet == pytest.approx(clean.feet)
 
 

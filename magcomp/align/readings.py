@@ -26,6 +26,9 @@ PARAMETER_SETTLE_S = 1.5
 ARMED_ENOUGH_S = 30.0
 """With this much armed time, disarmed time (carried about, parked on steel) is left out."""
 
+SHORT_PAUSE_S = 6.0
+"""A pause between two armed stretches in which nobody carries a vehicle about: of motor tests."""
+
 
 MOST_READINGS = 20_000
 """Half an hour at 10 Hz. More are thinned before a fit: the bound of an hour's flight is that of
@@ -85,8 +88,9 @@ def readings(
     keep &= _usable_state(reported.time, recording.armed)
     if not keep.any():
         raise MissingDataError(
-            f"{recording.source} must hold usable readings of compass {compass} in the time "
-            f"asked for; instead {_unusable(int(asked.sum()), len(reported))}"
+            f"{recording.source} must hold usable readings of compass {compass}"
+            f"{_span(start, end, recording.duration_s)}; instead "
+            f"{_unusable(int(asked.sum()), len(reported))}"
         )
     time = reported.time[keep]
     in_force, stretch = _corrections(recording, compass, time, changes)
@@ -123,11 +127,19 @@ def _within_span(recording: Recording, time: FloatArray, start: float, end: floa
     return np.asarray((time >= start) & (time <= end))
 
 
+def _span(start: float, end: float, duration: float) -> str:
+    """The time asked for, in words; nothing where that is all there is."""
+    if start <= 0.0 and end >= duration:
+        return ""
+    until = f" to {end:g} s" if end < duration else f", and the log ends at {duration:.0f} s"
+    return f" from {max(start, 0.0):g} s{until}"
+
+
 def _unusable(asked: int, all_: int) -> str:
     """In words, why no reading is left of those in the time asked for."""
     if not asked:
-        return f"none of its {all_} is in that time"
-    return f"all {asked} of that time were repeats, in gaps of the attitude, or taken disarmed"
+        return f"none of its {all_} is there"
+    return f"all {asked} there were repeats, in gaps of the attitude, or taken disarmed"
 
 
 def within(readings: Readings, known: Series) -> Readings:
@@ -195,9 +207,20 @@ def _usable_state(time: FloatArray, armed: Series | None) -> BoolArray:
     everything = np.ones(len(time), dtype=bool)
     if armed is None or len(armed) < 2:
         return everything
-    state = armed.value[np.clip(np.searchsorted(armed.time, time, "right") - 1, 0, None)] > 0.5
+    is_armed = _with_short_pauses(armed)
+    state = is_armed[np.clip(np.searchsorted(armed.time, time, "right") - 1, 0, None)]
     seconds = float(np.sum(np.diff(armed.time) * armed.value[:-1]))
     return np.asarray(state) if seconds >= ARMED_ENOUGH_S and state.any() else everything
+
+
+def _with_short_pauses(armed: Series) -> BoolArray:
+    """Whether each state counts as armed: it is, or pauses shortly between two that are."""
+    is_armed = armed.value > 0.5
+    edges = np.flatnonzero(np.diff(is_armed)) + 1
+    begin = np.concatenate([[-np.inf], armed.time[edges]])
+    end = np.concatenate([armed.time[edges], [np.inf]])
+    short = end - begin <= SHORT_PAUSE_S
+    return np.asarray(is_armed | short[np.searchsorted(edges, np.arange(len(armed)), "right")])
 
 
 def _mend_truncation(value: FloatArray) -> FloatArray:

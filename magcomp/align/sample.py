@@ -60,8 +60,8 @@ def sample(
         attitude=attitude,
         down=down,
         down_rate=down_rate,
-        u=interpolate(control.series, commanded),
-        u_rate=_rate(control.series, commanded),
+        u=_columns(interpolate(control.series, commanded)),
+        u_rate=_columns(_rate(control.series, commanded)),
     )
 
 
@@ -76,6 +76,11 @@ def interpolate(series: Series, time: FloatArray) -> FloatArray:
     if series.value.ndim == 1:
         return np.asarray(np.interp(time, series.time, series.value))
     return np.stack([np.interp(time, series.time, column) for column in series.value.T], axis=1)
+
+
+def _columns(values: FloatArray) -> FloatArray:
+    """One number a row, shape (n,), as the column of a matrix; (n, k) stays."""
+    return values[:, None] if values.ndim == 1 else values
 
 
 def _rate(series: Series, time: FloatArray) -> FloatArray:
@@ -107,10 +112,10 @@ def _undo(
                     f"hold the {stretch.regressor}; instead it holds none"
                 )
             series = controls[stretch.regressor].series
-            motor = stretch.correction.motor
-            field = field - np.multiply.outer(interpolate(series, applied[rows]), motor)
+            added = stretch.correction.added
+            field = field - added(interpolate(series, applied[rows]))
             # d/dlag of −MOT·u(t − lag) is +MOT·u̇.
-            raw_rate[rows] = np.multiply.outer(_rate(series, applied[rows]), motor) @ inverse.T
+            raw_rate[rows] = added(_rate(series, applied[rows])) @ inverse.T
         raw[rows] = field @ inverse.T - stretch.correction.offset
     return raw, raw_rate
 

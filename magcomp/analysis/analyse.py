@@ -36,6 +36,7 @@ from magcomp.model import (
     Recording,
     Verdict,
     pack,
+    quantity_of,
 )
 
 ESC = "esc"
@@ -242,7 +243,8 @@ def _bounds(verdict: Verdict) -> list[float]:
 def _complaints(recording: Recording, compass: int, kind: str) -> tuple[str, ...]:
     """What is wrong with the sensors that an answer by a control quantity rests on."""
     of_compass = compass_complaints(recording, compass) + vehicle_complaints(recording)
-    return of_compass + current_complaints(recording) if kind == CURRENT else of_compass
+    by_throttle = quantity_of(kind).is_throttle
+    return of_compass if by_throttle else of_compass + current_complaints(recording)
 
 
 def _in_words_of(recording: Recording, verdict: Verdict) -> Verdict:
@@ -318,7 +320,7 @@ def _notes(
 ) -> Iterable[str]:
     if len(held_out) > 1:
         yield comparison(held_out, chosen)
-    elif chosen == THROTTLE and recording.current is None:
+    elif quantity_of(chosen).is_throttle and recording.current is None:
         yield "the log holds no battery current, so throttle is used"
     if not has_position(recording):
         yield "the log holds no position: the earth's field is taken from the readings themselves"

@@ -11,13 +11,13 @@ import numpy as np
 from magcomp import __version__, autopilots
 from magcomp.autopilots import Autopilot, Kind
 from magcomp.model import (
-    CURRENT,
     Analysis,
     CompassResult,
     Grade,
     MotorFit,
     ParameterSet,
     Recording,
+    quantity_of,
 )
 
 _IDLE_SHARE = 0.1
@@ -72,7 +72,7 @@ def emit(recording: Recording, fits: Sequence[MotorFit]) -> Mapping[int, Emissio
 
 def _usual(recording: Recording, regressor: str) -> float:
     """The control quantity in ordinary flight: the median of what is above a tenth of the top."""
-    series = recording.current if regressor == CURRENT else recording.throttle
+    series = quantity_of(regressor).of(current=recording.current, throttle=recording.throttle)
     if series is None or not len(series):
         return 0.0
     working = series.value > _IDLE_SHARE * float(np.max(series.value))

@@ -8,7 +8,7 @@ import numpy as np
 
 from magcomp import autopilots
 from magcomp.errors import MissingDataError
-from magcomp.model import CURRENT, SPEED_CONTROLLERS, FloatArray, Recording, Series
+from magcomp.model import SPEED_CONTROLLERS, FloatArray, Recording, Series, quantity_of
 
 _USUAL = ("copter", "unknown")
 _LEAST_SHARE = 0.1
@@ -45,7 +45,7 @@ def why_only_to_look_at(recording: Recording, kind: str) -> str:
             f"{autopilot.title} multiplies only the {' or '.join(can)} in a "
             f"{recording.vehicle.kind}: a fit by {kind} is to look at, and cannot be written"
         )
-    if kind == CURRENT and recording.battery not in autopilot.batteries:
+    if not quantity_of(kind).is_throttle and recording.battery not in autopilot.batteries:
         numbers = " or ".join(map(str, autopilot.batteries))
         whose = f"battery {recording.battery}"
         if recording.battery == SPEED_CONTROLLERS:
@@ -64,7 +64,7 @@ def multiplied_notes(recording: Recording, kind: str) -> Iterator[str]:
         autopilot = autopilots.of(recording)
         can = " or ".join(autopilot.multiplied(vehicle))
         yield f"the vehicle is a {vehicle.kind}, in which {autopilot.title} multiplies the {can}"
-    if kind == CURRENT:
+    if not quantity_of(kind).is_throttle:
         yield from _other_batteries(recording)
     if why_not := why_only_to_look_at(recording, kind):
         yield why_not

@@ -27,7 +27,7 @@ from magcomp.autopilots.ardupilot_names import (
     single_name,
     vector_names,
 )
-from magcomp.autopilots.protocol import Kind
+from magcomp.autopilots.terms import Kind
 from magcomp.errors import ParameterFileError
 from magcomp.model import CURRENT, THROTTLE, Correction, InForce, ParameterHistory
 
@@ -159,7 +159,7 @@ def correction_parameters(correction: Correction, compass: int, scale: float) ->
     return {
         **vector_parameters("OFS", compass, correction.offset),
         **soft_iron_parameters(correction.soft_iron / scale, compass),
-        **vector_parameters("MOT", compass, correction.motor),
+        **vector_parameters("MOT", compass, correction.vector),
     }
 
 
@@ -295,15 +295,13 @@ def correct(raw: ArrayLike, u: ArrayLike, calibration: Calibration) -> FloatArra
     u
         Control quantity in the unit of ``calibration.compensation``, shape (...).
     """
-    linear = calibration.scale * (np.asarray(raw, float) + calibration.offset)
-    motor = np.multiply.outer(np.asarray(u, float), calibration.motor)
-    return np.asarray(linear @ calibration.soft_iron.T + motor)
+    rows = np.asarray(raw, float)
+    made = in_force(calibration).correction.apply(rows.reshape(-1, 3), np.ravel(u))
+    return made.reshape(rows.shape)
 
 
 def uncorrect(corrected: ArrayLike, u: ArrayLike, calibration: Calibration) -> FloatArray:
     """Sensor field from a corrected one: the inverse of :func:`correct`."""
-    motor = np.multiply.outer(np.asarray(u, float), calibration.motor)
-    linear = np.linalg.solve(
-        calibration.soft_iron, (np.asarray(corrected, float) - motor)[..., None]
-    )
-    return np.asarray(linear[..., 0] / calibration.scale - calibration.offset)
+    rows = np.asarray(corrected, float)
+    made = in_force(calibration).correction.undo(rows.reshape(-1, 3), np.ravel(u))
+    return made.reshape(rows.shape)

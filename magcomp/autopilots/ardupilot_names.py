@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-from magcomp.autopilots.protocol import Kind, ParameterName
+from magcomp.autopilots.terms import Kind, ParameterName
 
 COMPASS_COUNT = 3
 NUMBERS = range(1, COMPASS_COUNT + 1)
@@ -43,6 +43,14 @@ _OTHERS = {
 _VECTOR = re.compile(r"(COMPASS_(MOT|OFS|DIA|ODI)([23]?))_([XYZ])")
 _SINGLE = re.compile(r"COMPASS_(SCALE|DEV_ID|USE|ORIENT|EXTERN)([23]?)")
 _PER_MOTOR = re.compile(r"(COMPASS_PMOT(?:_EXP|[1-4]))(?:_([XYZ]))?")
+
+KEPT = re.compile(
+    r"COMPASS_DEV_ID\d?|FORMAT_VERSION|SYSID_SW_MREV|SYS_NUM_RESETS|STAT_\w+"
+    r"|GND_(ABS_PRESS|TEMP)|BARO\d?_(GND_PRESS|DEVID)"
+    r"|INS_(ACC|GYR)\d?_ID|INS\d_(ACC|GYR)_ID|ARSPD\d?_(OFFSET|DEVID)|GPS\d?_CAN_NODEID\d?"
+    r"|LOG_LASTFILE|(MIS|FENCE|RALLY|CMD)_(TOTAL|INDEX)"
+)
+"""What the firmware keeps itself, much as ground stations leave it out of a file that they load."""
 
 _INT8, _INT16, _INT32 = 2, 4, 6  # MAV_PARAM_TYPE
 

@@ -38,6 +38,7 @@ from magcomp.model import (
     InForce,
     ParameterHistory,
     Series,
+    quantity_of,
 )
 
 MGAUSS = 1000.0
@@ -75,7 +76,7 @@ def compensation_of(regressor: str, battery: int) -> Compensation:
     battery
         0 or 1, as the firmware counts.
     """
-    if regressor == THROTTLE:
+    if quantity_of(regressor).is_throttle:
         return Compensation.THRUST
     return Compensation.CURRENT_1 if battery == 1 else Compensation.CURRENT_0
 
@@ -271,7 +272,7 @@ def sensor_calibration(
         offset=np.asarray(-rotation.T @ correction.offset / MGAUSS),
         scale=np.diag(soft_iron).copy(),
         off_diagonal=soft_iron[(0, 0, 1), (1, 2, 2)],
-        motor=np.asarray(np.linalg.solve(soft_iron, rotation.T @ correction.motor) / unit),
+        motor=np.asarray(np.linalg.solve(soft_iron, rotation.T @ correction.vector) / unit),
         compensation=compensation,
     )
 

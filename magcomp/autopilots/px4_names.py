@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 
-from magcomp.autopilots.protocol import Kind, ParameterName
+from magcomp.autopilots.terms import Kind, ParameterName
 
 SLOTS = range(4)
 AXES = ("X", "Y", "Z")
@@ -26,6 +26,10 @@ VECTORS = {
 }
 _VECTOR = re.compile(r"CAL_MAG([0-3])_([XYZ])(OFF|SCALE|ODIAG|COMP)")
 _SINGLE = re.compile(r"CAL_MAG([0-3])_(ID|ROT|PRIO|ROLL|PITCH|YAW)")
+KEPT = re.compile(
+    r"CAL_\w+_ID|SYS_PARAM_VER|LND_FLIGHT_T_(HI|LO)|COM_FLIGHT_UUID|SENS_DPRES_OFF|\w+_DEVID"
+)
+"""What the firmware keeps itself."""
 _INT32 = 6  # MAV_PARAM_TYPE
 _ANGLES = ("ROLL", "PITCH", "YAW")
 

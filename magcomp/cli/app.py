@@ -16,7 +16,7 @@ import click
 
 from magcomp import __version__
 from magcomp.cli.output import complain, flush
-from magcomp.errors import ExitCode, MagcompError
+from magcomp.errors import ExitCode, MagcompError, NoLogError
 
 
 class _Command(NamedTuple):
@@ -37,6 +37,9 @@ COMMANDS = {
     "reproduce": _Command("magcomp.cli.reproduce", "Reproduce the paper's experiments."),
     "calibrate": _Command(
         "magcomp.cli.calibrate", "Guide, record and fit a live vehicle; write the answer to it."
+    ),
+    "sweep": _Command(
+        "magcomp.cli.sweep", "Spin the motors on the ground, step by step; fit and write."
     ),
     "record": _Command("magcomp.cli.record", "Record a live vehicle into a .tlog."),
     "upload": _Command("magcomp.cli.upload", "Write a parameter file to a vehicle, and prove it."),
@@ -63,6 +66,16 @@ class LazyGroup(click.Group):
         if not isinstance(command, click.Command):
             raise TypeError(f"{COMMANDS[cmd_name].module}.{cmd_name} must be a click command")
         return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Find the command, or say which ones are spelt much alike."""
+        try:
+            return super().resolve_command(ctx, args)
+        except click.NoSuchCommand as error:
+            # Click knows only commands that have been imported.
+            raise click.NoSuchCommand(error.command_name, possibilities=COMMANDS, ctx=ctx) from None
 
     def format_commands(
         self,
@@ -114,6 +127,11 @@ def run(arguments: list[str]) -> int:
     except Exception as error:
         sentence, code, foreseen = _explain(error)
         complain(sentence)
+        if isinstance(error, NoLogError):
+            # What reads logs is imported by now, and this with it.
+            from magcomp.cli.places import where_logs_are  # noqa: PLC0415
+
+            complain(where_logs_are())
         for note in getattr(error, "__notes__", ()):
             complain(note)
         if not foreseen and ("--debug" in arguments or os.environ.get("MAGCOMP_DEBUG")):
@@ -131,8 +149,10 @@ def _explain(error: Exception) -> tuple[str, ExitCode, bool]:
             return "a command must be given. Try 'magcomp --help'", ExitCode.USAGE, True
         case click.ClickException():
             context = getattr(error, "ctx", None)
-            hint = f". Try '{context.command_path} --help'" if context is not None else ""
-            return error.format_message().rstrip(".?") + hint, ExitCode.USAGE, True
+            said = error.format_message().rstrip(".")
+            said += "" if said.endswith(("?", "?)")) else "."
+            hint = f" Try '{context.command_path} --help'" if context is not None else ""
+            return said + hint, ExitCode.USAGE, True
         case OSError() | UnicodeError():
             return _sentence(error), ExitCode.USAGE, False
         case MemoryError():

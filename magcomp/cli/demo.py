@@ -235,7 +235,7 @@ def _show_flown(bench: _Bench, before: Recording, after: Recording) -> None:
     ]
     worst = {name: max(found[c].largest for c in found) for name, found in errors.items()}
     answer("\n")
-    answer(as_text.render(bars("rms in flight", ("before", "after"), rows), look()))
+    answer(as_text.render([bars("rms in flight", ("before", "after"), rows)], look()))
     _line(
         f"The worst single reading was wrong by {worst['before']:.1f}° before, by "
         f"{worst['after']:.1f}° after, noise and turns included."

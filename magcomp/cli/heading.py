@@ -16,10 +16,10 @@ from magcomp import __version__, autopilots
 from magcomp.analysis import Options
 from magcomp.autopilots import Autopilot
 from magcomp.cli.heading_live import Following, follow, is_live
-from magcomp.cli.linking import LinkOptions, positive_seconds, reach_options
+from magcomp.cli.linking import LinkOptions, positive_seconds, reach_options, say_meaning
 from magcomp.cli.options import Selection, selection_options
-from magcomp.cli.output import answer, complain, look
-from magcomp.cli.work import fit_log, read_log
+from magcomp.cli.output import answer, answer_words, complain, look, wrapped
+from magcomp.cli.work import fit_log, read_log, read_parameters
 from magcomp.compensate import Gravity, Track, track
 from magcomp.errors import ExitCode, MissingDataError, ParameterFileError, UsageError
 from magcomp.experiments.motion import HeadingAccuracy, accuracy, heading_errors
@@ -27,7 +27,6 @@ from magcomp.geometry import wrap_angle
 from magcomp.model import FloatArray, Grade, InForce, Recording, Series
 from magcomp.report.words import printable
 from magcomp.sources.truth import Truth, read_truth
-from magcomp.writing.files import read_parameter_file
 
 _NAMES = ("raw", "corrected", "fused")
 _SIGNS = (".", "+", "•")
@@ -119,7 +118,7 @@ def heading(
         chosen = {} if parameters is None else _chosen(parameters, autopilots.ALL)
         wanted = Following(compass, chosen, positive_seconds(seconds) or math.inf, to_json)
         whom = replace(link, system=selection.system, component=selection.component)
-        return follow(source, whom, wanted)
+        return follow(say_meaning(source), whom, wanted)
     if seconds is not None:
         raise UsageError("--seconds must come with a live vehicle; instead received it with a log")
     log = Path(source)
@@ -137,9 +136,9 @@ def heading(
     if to_json:
         answer(json.dumps(_document(found), allow_nan=False) + "\n")
         return ExitCode.GOOD
-    answer(_text(found))
+    answer_words(_text(found))
     if plot:
-        answer(_plots(found))
+        answer_words(_plots(found))
     return ExitCode.GOOD
 
 
@@ -168,7 +167,7 @@ def _correction(
 
 
 def _chosen(parameters: Path, known: Sequence[Autopilot]) -> Mapping[str, float]:
-    chosen = read_parameter_file(parameters).values
+    chosen = read_parameters(parameters).values
     prefixes = tuple(autopilot.compass_prefix for autopilot in known)
     if not any(name.startswith(prefixes) for name in chosen):
         raise ParameterFileError(
@@ -222,9 +221,12 @@ def _text(found: _Answer) -> str:
     lines = [
         "",
         f" {printable(found.recording.source)}, compass {made.compass}",
-        f" corrected by {printable(found.origin)}, {by}; "
-        f"the field is {1000 * made.field_lag_s:.0f} ms late, "
-        f"declination {math.degrees(made.declination):+.1f}°",
+        *wrapped(
+            f"corrected by {printable(found.origin)}, {by}; "
+            f"the field is {1000 * made.field_lag_s:.0f} ms late, "
+            f"declination {math.degrees(made.declination):+.1f}°",
+            look().columns,
+        ),
         "",
         "".join([f" {'time, s':>9}", *(f"{name:>13}" for name in headings)]),
     ]

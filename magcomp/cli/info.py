@@ -7,14 +7,13 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
-from textwrap import wrap
 from typing import Any
 
 import click
 
 from magcomp.analysis.contents import CompassContents, Contents, Quantity, contents
 from magcomp.cli.options import Selection, json_option, log_argument, selection_options
-from magcomp.cli.output import answer, look
+from magcomp.cli.output import answer, answer_words, look, wrapped
 from magcomp.cli.work import read_log
 from magcomp.errors import ExitCode
 from magcomp.model import Recording
@@ -32,7 +31,7 @@ def info(log: Path, selection: Selection, to_json: bool) -> ExitCode:
     if to_json:
         answer(as_json.dumps(_document(recording, found)))
     else:
-        answer("\n".join(["", *_lines(recording, found, look().columns), "", ""]))
+        answer_words("\n".join(["", *_lines(recording, found, look().columns), "", ""]))
     return ExitCode.GOOD
 
 
@@ -82,7 +81,9 @@ def _lines(recording: Recording, found: Contents, columns: int) -> Iterator[str]
     yield f" {words.printable(recording.source)}"
     of_it = [words.vehicle(vehicle), vehicle.board, vehicle.frame and f"frame {vehicle.frame}"]
     yield f" {words.duration(recording.duration_s)} of {', '.join(filter(None, of_it))}"
-    yield f" {_began(recording.start_unix_s)}, {_parameters(recording, found)}"
+    yield from wrapped(
+        f"{_began(recording.start_unix_s)}, {_parameters(recording, found)}", columns
+    )
     if recording.report.skipped:
         yield f" {recording.report.skipped} bytes of {recording.report.size} belong to no message"
     if found.armed_s is not None:
@@ -144,19 +145,15 @@ def _verdict(recording: Recording, found: Contents, columns: int) -> Iterator[st
     for compass in found.compasses:
         if compass.left_out:
             why = words.sentence(f"compass {compass.number} is left out: {compass.left_out}")
-            yield from _wrapped(why, columns)
+            yield from wrapped(why, columns)
     for note in recording.report.notes:
-        yield from _wrapped(words.sentence(note), columns)
+        yield from wrapped(words.sentence(note), columns)
     log = words.printable(recording.source)
     if not found.missing:
         yield f" Nothing is missing. To fit it: magcomp fit {log}"
         return
     for missing in found.missing:
         weight = "No fit without" if missing.prevents else "A better fit with"
-        yield from _wrapped(f"{weight} {missing.what}: {missing.how}.", columns)
+        yield from wrapped(f"{weight} {missing.what}: {missing.how}.", columns)
     if found.can_be_fitted:
         yield f" To fit it all the same: magcomp fit {log}"
-
-
-def _wrapped(text: str, columns: int) -> list[str]:
-    return wrap(text, columns - 1, initial_indent=" ", subsequent_indent="   ")

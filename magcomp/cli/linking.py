@@ -15,10 +15,18 @@ from typing import TypeVar
 
 import click
 
-from magcomp.cli.output import complain
+from magcomp.cli.output import complain, takes_ascii_only
 from magcomp.cli.vehicle import vehicle_options
-from magcomp.errors import UsageError
-from magcomp.link import GROUND_STATION_SYSTEM, is_read_by_others, read_signing_key
+from magcomp.errors import AddressError, UsageError
+from magcomp.link import (
+    GROUND_STATION_SYSTEM,
+    Replay,
+    SerialLine,
+    is_read_by_others,
+    parse_address,
+    read_signing_key,
+)
+from magcomp.report.ascii import encodable, plain
 
 _Result = TypeVar("_Result")
 
@@ -27,7 +35,21 @@ _TEXT_WIDTH = 42
 HEARTBEAT_S = 10.0
 """How long the first heartbeat is waited for."""
 
-address_argument = click.argument("address")
+
+def say_meaning(address: str) -> str:
+    """Say what an address means, where it was typed short; what is none is left to the link."""
+    with contextlib.suppress(AddressError):
+        meant = parse_address(address)
+        if not isinstance(meant, Replay | SerialLine) and str(meant) != address:
+            complain(f"{address} means {meant}: {meant.meaning}")
+    return address
+
+
+def _told(_context: click.Context, _parameter: click.Parameter, address: str) -> str:
+    return say_meaning(address)
+
+
+address_argument = click.argument("address", callback=_told)
 yes_option = click.option("--yes", is_flag=True, help="Write without asking.")
 any_vehicle_option = click.option(
     "--any-vehicle", is_flag=True, help="Write to another vehicle than the parameters belong to."
@@ -212,7 +234,7 @@ def _columns() -> int:
 
 def _to_stderr(text: str) -> None:
     if sys.stderr is not None:
-        encoding = sys.stderr.encoding or "utf-8"
+        shown = plain(text) if takes_ascii_only(sys.stderr) else text
         with contextlib.suppress(BrokenPipeError):
-            sys.stderr.write(text.encode(encoding, errors="replace").decode(encoding))
+            sys.stderr.write(encodable(shown, sys.stderr.encoding or "utf-8"))
             sys.stderr.flush()

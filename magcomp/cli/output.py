@@ -7,15 +7,19 @@ import shutil
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from textwrap import wrap
 from typing import TextIO
 
 from magcomp.errors import OutputError
+from magcomp.report.ascii import encodable, in_words, is_ascii_only
 from magcomp.report.look import Look
 
 Step = Callable[[str, float], None]
 """What is being done, and the share done, 0 … 1."""
 
-_LEAST_COLUMNS, _MOST_COLUMNS = 80, 100
+_LEAST_COLUMNS, _USUAL_COLUMNS, _MOST_COLUMNS = 60, 80, 100
+_GROWTH = 6
+"""Columns that a line of ASCII may grow by: degrees become a word."""
 
 
 _COMMAND = "\n  magcomp "
@@ -28,7 +32,8 @@ def complain(message: str) -> None:
     if sentence and sentence[-1] not in ".!?:":
         sentence += "."
     line = f"{_COMMAND}{_printable(command)}" if command else ""
-    _write(sys.stderr, f"magcomp: {sentence}{line}\n")
+    whole = f"magcomp: {sentence}{line}\n"
+    _write(sys.stderr, in_words(whole) if takes_ascii_only(sys.stderr) else whole)
 
 
 def _printable(text: str) -> str:
@@ -53,14 +58,22 @@ def answer(text: str) -> None:
         raise OutputError(f"stdout must be writable; instead received: {error.strerror}") from error
 
 
+def answer_words(text: str) -> None:
+    """Write a text for people, in ASCII where that is all there is; otherwise as `answer`."""
+    answer(in_words(text) if takes_ascii_only(sys.stdout) else text)
+
+
+def wrapped(text: str, columns: int) -> list[str]:
+    """Lines of a sentence, all but the first indented."""
+    return wrap(text, columns - 1, initial_indent=" ", subsequent_indent="   ")
+
+
 def _write(stream: TextIO | None, text: str) -> None:
     if stream is None:  # a parent closed it: there is nobody to tell
         return
     # What the stream's encoding lacks (block characters, half a file name) must not end the run.
-    encoding = stream.encoding or "utf-8"
-    printable = text.encode(encoding, errors="replace").decode(encoding)
     try:
-        stream.write(printable)
+        stream.write(encodable(text, stream.encoding or "utf-8"))
         stream.flush()
     except BrokenPipeError:
         _discard(stream)
@@ -89,10 +102,16 @@ def _discard(stream: TextIO | None) -> None:
 
 
 def look() -> Look:
-    """The terminal's width, from 80 to 100 columns; colours where wanted."""
-    size = shutil.get_terminal_size((_LEAST_COLUMNS, 24))
+    """The terminal's width, from 60 to 100 columns; colours where wanted; ASCII where needed."""
+    size = shutil.get_terminal_size((_USUAL_COLUMNS, 24))
     width = min(max(size.columns, _LEAST_COLUMNS), _MOST_COLUMNS)
-    return Look(columns=width, colour=_colour_wanted())
+    plain = takes_ascii_only(sys.stdout)
+    return Look(width - _GROWTH if plain else width, _colour_wanted(), ascii_only=plain)
+
+
+def takes_ascii_only(stream: TextIO | None) -> bool:
+    """Whether what reads a stream takes nothing but ASCII."""
+    return is_ascii_only(stream.encoding if stream else None, os.environ)
 
 
 def _colour_wanted() -> bool:
@@ -115,7 +134,7 @@ def progress() -> Iterator[Step]:
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn  # noqa: PLC0415
 
     parts = (
-        SpinnerColumn(),
+        SpinnerColumn("line" if takes_ascii_only(sys.stderr) else "dots"),
         TextColumn("{task.description}"),
         BarColumn(bar_width=30),
         TextColumn("{task.percentage:>3.0f} %"),

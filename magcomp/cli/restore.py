@@ -19,6 +19,7 @@ from magcomp.cli.writing import need_consent
 from magcomp.errors import ExitCode
 from magcomp.live.upload import finish_restore, read_backup
 from magcomp.writing.events import Standing
+from magcomp.writing.files import is_own
 from magcomp.writing.journal import JournalState
 
 _STANDS = {
@@ -60,7 +61,7 @@ def restore(
     if journal is not None:
         complain(told(journal))
     need_consent(yes=yes, dry_run=dry_run)
-    writing = Writing(yes, dry_run, any_vehicle, backup_to, wait)
+    writing = Writing(yes, dry_run, any_vehicle, backup_to, wait, everything=is_own(wanted))
     with VehicleLink.to(address, link) as there:
         code, plan = there.write(
             wanted,

@@ -2,24 +2,63 @@
 
 from __future__ import annotations
 
+import functools
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import TypeVar
 
 import click
 
 from magcomp.cli.linking import stop_on_interrupt
 from magcomp.cli.output import answer, complain
+from magcomp.cli.work import read_parameters
 from magcomp.errors import ExitCode
 from magcomp.link import read_signing_key
-from magcomp.simulate import PROGRAMS, Faults, Vehicle, scenario, serve
-from magcomp.writing.files import read_parameter_file
+from magcomp.simulate import AUTOPILOTS, PROGRAMS, Faults, Vehicle, scenario, serve
 
 _ADDRESS = "udpout:127.0.0.1:14550"
+
+_Result = TypeVar("_Result")
+
+
+def _fault_options(command: Callable[..., _Result]) -> Callable[..., _Result]:
+    """Give a command what goes wrong on the link."""
+
+    @click.option(
+        "--loss",
+        type=float,
+        default=0.0,
+        show_default=True,
+        metavar="P",
+        help="Share of the frames lost, each way, 0 … 1.",
+    )
+    @click.option(
+        "--latency",
+        type=float,
+        default=0.0,
+        show_default=True,
+        metavar="S",
+        help="Time every frame takes, each way.",
+    )
+    @functools.wraps(command)
+    def with_faults(loss: float, latency: float, **others: object) -> _Result:
+        faults = Faults(loss=loss, latency_s=latency) if loss or latency else None
+        return command(faults=faults, **others)
+
+    return with_faults
 
 
 @click.command("simulate")
 @click.argument("address", default=_ADDRESS)
 @click.option("--seed", type=int, default=1, show_default=True, help="Which vehicle.")
+@click.option(
+    "--autopilot",
+    type=click.Choice(list(AUTOPILOTS)),
+    default=next(iter(AUTOPILOTS)),
+    show_default=True,
+    help="Whose firmware it has.",
+)
 @click.option(
     "--program",
     type=click.Choice(PROGRAMS),
@@ -35,22 +74,7 @@ _ADDRESS = "udpout:127.0.0.1:14550"
     metavar="X",
     help="How many times faster than real time.",
 )
-@click.option(
-    "--loss",
-    type=float,
-    default=0.0,
-    show_default=True,
-    metavar="P",
-    help="Share of the frames lost, each way, 0 … 1.",
-)
-@click.option(
-    "--latency",
-    type=float,
-    default=0.0,
-    show_default=True,
-    metavar="S",
-    help="Time every frame takes, each way.",
-)
+@_fault_options
 @click.option(
     "--truth",
     type=click.Path(path_type=Path),
@@ -79,10 +103,10 @@ _ADDRESS = "udpout:127.0.0.1:14550"
 def simulate(
     address: str,
     seed: int,
+    autopilot: str,
     program: str,
     speed: float,
-    loss: float,
-    latency: float,
+    faults: Faults | None,
     truth: Path | None,
     parameters: Path | None,
     signing_key: Path | None,
@@ -90,29 +114,32 @@ def simulate(
 ) -> ExitCode:
     """Run a simulated copter with three compasses at ADDRESS (udpout:127.0.0.1:14550).
 
+    It behaves as ArduCopter 4.6 or, with --autopilot px4, as PX4 1.15 on a telemetry radio.
+
     ADDRESS may be udpout:HOST:PORT, udp:HOST:PORT, tcpin:HOST:PORT, tcp:HOST:PORT or pty. It
     waits for a ground station, carries out its programme, and is then disarmed and ready to be
     written. Its compasses are disturbed by its motors; --truth says how. Ctrl-C ends it.
     """
-    faults = Faults(loss=loss, latency_s=latency) if loss or latency else None
     key = None if signing_key is None else read_signing_key(signing_key)
     chosen = scenario(program, seed)
-    held = {} if parameters is None else read_parameter_file(parameters).values
+    held = {} if parameters is None else read_parameters(parameters).values
     vehicle = Vehicle(
         chosen,
         start_unix_s=time.time(),
         wait_for_ground=True,
         signing_key=key,
         parameters=held,
+        autopilot=autopilot,
         system=system,
     )
     if truth is not None:
-        chosen.truth.write(truth)
+        vehicle.write_truth(truth)
 
     def announce(reached_at: str) -> None:
         complain(
-            f"A simulated vehicle (seed {seed}) waits for a ground station, then: {program}, "
-            f"{vehicle.duration_s / speed:.0f} s. Reach it with:\n  magcomp calibrate {reached_at}"
+            f"A simulated vehicle ({autopilot}, seed {seed}) waits for a ground station, then: "
+            f"{program}, {vehicle.duration_s / speed:.0f} s. Reach it with:\n"
+            f"  magcomp calibrate {reached_at}"
         )
         answer(f"{reached_at}\n")
 

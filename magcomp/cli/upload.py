@@ -61,7 +61,7 @@ class Writing:
 
     Attributes
     ----------
-    yes, dry_run, any_vehicle
+    yes, dry_run, any_vehicle, everything
         The options of these names.
     backup
         None for one in the data directory.
@@ -74,6 +74,7 @@ class Writing:
     any_vehicle: bool
     backup: Path | None
     wait: float
+    everything: bool = False
 
 
 @click.command("upload")
@@ -84,6 +85,7 @@ class Writing:
 @any_vehicle_option
 @backup_option
 @wait_option
+@click.option("--all", "everything", is_flag=True, help="Write what is no compass calibration too.")
 @link_options
 def upload(
     file: Path,
@@ -93,15 +95,17 @@ def upload(
     any_vehicle: bool,
     backup_to: Path | None,
     wait: float,
+    everything: bool,
     link: LinkOptions,
 ) -> ExitCode:
     """Write the compass calibration in FILE to the vehicle at ADDRESS, and prove it arrived.
 
-    Only to a disarmed vehicle, and only to the one the file belongs to. What it held is kept in
-    a backup first; a failure or Ctrl-C puts it back, and so does magcomp restore.
+    Only to a disarmed vehicle, and only to the one the file belongs to. Of a full parameter file
+    only the calibration is written, unless --all asks for the rest. What the vehicle held is kept
+    in a backup first; a failure or Ctrl-C puts it back, and so does magcomp restore.
     """
     wanted = read_parameter_file(file)
-    writing = Writing(yes, dry_run, any_vehicle, backup_to, wait)
+    writing = Writing(yes, dry_run, any_vehicle, backup_to, wait, everything)
     need_consent(yes=yes, dry_run=dry_run)
     with VehicleLink.to(address, link) as there:
         return there.write(wanted, writing)[0]
@@ -160,7 +164,7 @@ class VehicleLink:
         """
         address = str(self.connection.address)
         plan = self._plan(wanted, writing)
-        show_difference(plan)
+        show_difference(plan, everything=writing.everything)
         if not plan.changes:
             complain(nothing or "The vehicle holds all of this already; nothing is written")
             say_what_is_held(plan, after=False)
@@ -201,6 +205,7 @@ class VehicleLink:
                 self.vehicle,
                 wanted,
                 any_vehicle=writing.any_vehicle,
+                everything=writing.everything,
                 on_progress=lambda progress: (
                     status.show("reading the vehicle", f"{progress.done:3d}/{progress.total:<3d}")
                     if status.is_terminal

@@ -8,9 +8,10 @@ from pathlib import Path
 from magcomp.analysis import Options, analyse, check
 from magcomp.analysis.choose import with_attitude, with_battery
 from magcomp.cli.options import Selection
-from magcomp.cli.output import progress
-from magcomp.model import Analysis, Recording, Verdict
+from magcomp.cli.output import complain, progress
+from magcomp.model import Analysis, ParameterSet, Recording, Verdict
 from magcomp.sources import read
+from magcomp.writing.files import read_parameter_file
 
 _READING = 0.1
 """Share of the progress bar that reading the log takes."""
@@ -42,6 +43,14 @@ def read_log(log: Path, selection: Selection) -> Recording:
     """Read a log."""
     with progress() as step:
         return _read(log, selection, lambda share: step("reading the log", share))
+
+
+def read_parameters(path: Path) -> ParameterSet:
+    """Read a parameter file, and say what it leaves in doubt."""
+    found = read_parameter_file(path)
+    for warning in found.warnings:
+        complain(warning)
+    return found
 
 
 def _read(log: Path, selection: Selection, progress: Callable[[float], None]) -> Recording:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -30,6 +30,8 @@ from magcomp.writing.writer import raise_for_failure
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
+
+_FEW = 5
 
 _STAGES = {
     Stage.COMPARE: "comparing with the backup",
@@ -59,7 +61,7 @@ def need_consent(*, yes: bool, dry_run: bool = False) -> None:
         raise UsageError("--yes must be given to write where there is no terminal to ask at")
 
 
-def show_difference(plan: WritePlan, *, to_stderr: bool = False) -> None:
+def show_difference(plan: WritePlan, *, to_stderr: bool = False, everything: bool = False) -> None:
     """Print old → new of every parameter that changes, and what the pilot must know."""
     from rich.text import Text  # noqa: PLC0415
 
@@ -75,10 +77,22 @@ def show_difference(plan: WritePlan, *, to_stderr: bool = False) -> None:
     else:
         answer(text)
     if plan.left_out:
-        shown = ", ".join(plan.left_out[:5]) + (", …" if len(plan.left_out) > 5 else "")
-        complain(f"{shown} are no compass calibration and are left out")
+        complain(left_out(plan.left_out, everything=everything))
     for warning in plan.warnings:
         complain(warning)
+
+
+def left_out(names: Sequence[str], *, everything: bool) -> str:
+    """Say what of a file is not written, and why."""
+    few = ", ".join(names[:_FEW])
+    more = f" and {len(names) - _FEW} more" if len(names) > _FEW else ""
+    one = len(names) == 1
+    if everything:
+        why = f"{'is' if one else 'are'} unknown to the vehicle, or kept by it"
+    else:
+        why = f"{'is' if one else 'are'} no compass calibration"
+    hint = "" if everything else "; --all writes the rest too"
+    return f"{few}{more} {why}, and {'is' if one else 'are'} left out{hint}"
 
 
 def say_what_is_held(plan: WritePlan, *, after: bool) -> None:

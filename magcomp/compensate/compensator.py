@@ -45,7 +45,7 @@ class Compensator:
         self._set(
             correction.soft_iron,
             correction.soft_iron @ correction.offset,
-            correction.motor,
+            correction.vector,
             declination,
         )
 
@@ -84,9 +84,9 @@ class Compensator:
             )
         before = present.correction
         matrix = correction.soft_iron @ np.linalg.inv(before.soft_iron)
-        motor = correction.motor
+        motor = correction.vector
         if present.regressor is not None:
-            motor = motor - matrix @ before.motor
+            motor = motor - matrix @ before.vector
         made = cls.__new__(cls)
         made._set(
             matrix, correction.soft_iron @ (correction.offset - before.offset), motor, declination

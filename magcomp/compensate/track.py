@@ -113,7 +113,7 @@ def track(
     samples = problem.sample(lags)
     compensator = Compensator(correction, earth.declination)
     roll, pitch = samples.attitude[:, 0], samples.attitude[:, 1]
-    _, corrected = compensator.correct_all(samples.raw, samples.u, roll, pitch)
+    _, corrected = compensator.correct_all(samples.raw, samples.total, roll, pitch)
     return Track(
         compass=compass,
         time=samples.time - lags.field,
@@ -173,7 +173,7 @@ def events(
     # A message that carries gyro and field brings a field that is older than its gyro.
     arrived = np.searchsorted(samples.time, time, side="left")
     measured = (samples.time - samples.lags.field).tolist()
-    raw, u, attitude = samples.raw.tolist(), samples.u.tolist(), samples.attitude.tolist()
+    raw, u, attitude = samples.raw.tolist(), samples.total.tolist(), samples.attitude.tolist()
     told = 0
     for instant, rate, direction, count in zip(
         time.tolist(), rates.tolist(), down.tolist(), arrived.tolist(), strict=True

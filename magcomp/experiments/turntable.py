@@ -199,12 +199,12 @@ def _turn(
     sector = np.floor(np.degrees(motion.yaw) % 360.0 * (SECTORS / 360.0)).astype(np.intp)
     residuals = {}
     for method in METHODS:
-        field = made.apply(method, samples.raw, samples.u, level)
+        field = made.apply(method, samples.raw, samples.total, level)
         found = heading(field, motion.roll, motion.pitch, declination)
         residuals[method] = _by_sector(np.degrees(wrap_angle(found - motion.yaw)), sector)
     return Turn(
         control=control,
-        current_a=float(samples.u.mean()),
+        current_a=float(samples.total.mean()),
         heading_deg=np.arange(0.5, SECTORS) * (360.0 / SECTORS),
         residual_deg=residuals,
     )
@@ -233,7 +233,7 @@ def true_lag(samples: Samples, truth: Truth, earth: EarthField) -> float:
     The lag at which a symmetric matrix, an offset and a motor vector, all free, explain the raw
     field best (docs/method.md, Equation 3): it depends on none of the corrections compared.
     """
-    u = samples.u
+    u = samples.total
 
     def unexplained(lag: float) -> float:
         pose = true_motion(truth, samples.time - lag).earth_from_body

@@ -13,7 +13,9 @@ from magcomp.fit.field_model import (
     REGRESSOR_LAG,
     SIZE,
     STRENGTH,
+    correction_at,
     errors_of,
+    indices_of_correction,
     lags_of,
     vertical_of,
 )
@@ -43,7 +45,6 @@ from magcomp.model import (
     MotorFit,
     Readings,
     pack,
-    unpack,
 )
 
 METHODS = ("auto", "sweep", "levels", "flight")
@@ -158,11 +159,13 @@ def refit(problem: Problem, fit: MotorFit, keep: BoolArray) -> MotorFit:
 
 def _parameters_of(fit: MotorFit) -> FloatArray:
     """The parameters of a flight's fit, shape (SIZE,), with nothing said of tilt and lean."""
+    packed = pack(fit.correction)
     return np.concatenate(
         [
-            pack(fit.correction),
+            packed[:CORRECTION_SIZE],
             [fit.strength, fit.vertical / fit.strength, fit.lags.field, fit.lags.regressor],
             np.zeros(SIZE - CORRECTION_SIZE - 4),
+            packed[CORRECTION_SIZE:],
         ]
     )
 
@@ -221,7 +224,7 @@ def fit_alike(problem: Problem, fit: MotorFit) -> MotorFit:
     """
     free = _groups(fit)
     begin = _parameters_of(fit)
-    begin[MOTOR] = 0.0
+    begin[MOTOR] = begin[SIZE:] = 0.0
     found = estimate(problem, free, start=begin, with_covariance=False)
     errors = errors_of(problem.sample(lags_of(found.parameters)), found.parameters)
     found = estimate(
@@ -234,6 +237,7 @@ def _of_flight(problem: Problem, found: FlightEstimate, free: int) -> MotorFit:
     lags = lags_of(found.parameters)
     samples = problem.sample(lags)
     std = np.sqrt(np.diag(found.covariance))
+    among = indices_of_correction(len(found.parameters))
     return MotorFit(
         compass=samples.compass,
         method="flight",
@@ -241,7 +245,7 @@ def _of_flight(problem: Problem, found: FlightEstimate, free: int) -> MotorFit:
         regressor=problem.control.kind,
         origin=problem.control.origin,
         correction=correction_of(found),
-        covariance=found.covariance[:CORRECTION_SIZE, :CORRECTION_SIZE],
+        covariance=found.covariance[np.ix_(among, among)],
         free=frozenset(GROUPS[:free]),
         lags=lags,
         lags_std=Lags(float(std[FIELD_LAG]), float(std[REGRESSOR_LAG])),
@@ -250,8 +254,8 @@ def _of_flight(problem: Problem, found: FlightEstimate, free: int) -> MotorFit:
         noise=float(np.sqrt(np.mean(found.noise**2))),
         levels=(),
         line=None,
-        u_low=float(np.quantile(samples.u, 0.02)),
-        u_high=float(np.quantile(samples.u, 0.98)),
+        u_low=float(np.quantile(samples.total, 0.02)),
+        u_high=float(np.quantile(samples.total, 0.98)),
         count=len(samples),
     )
 
@@ -366,7 +370,7 @@ def _groups(fit: MotorFit) -> int:
 def _updated(fit: MotorFit, parameters: FloatArray) -> MotorFit:
     return replace(
         fit,
-        correction=unpack(parameters[:CORRECTION_SIZE]),
+        correction=correction_at(parameters),
         strength=float(parameters[STRENGTH]),
         vertical=vertical_of(parameters),
     )

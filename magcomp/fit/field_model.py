@@ -10,14 +10,26 @@ import numpy as np
 
 from magcomp.align.low_pass import low_pass
 from magcomp.fit.control_noise import Noise, noise_of, whitened
-from magcomp.model import CORRECTION_SIZE, MOTOR, OFFSET, FloatArray, Lags, Samples, unpack
+from magcomp.model import (
+    CORRECTION_SIZE,
+    MOTOR,
+    OFFSET,
+    Correction,
+    FloatArray,
+    IntArray,
+    Lags,
+    Samples,
+    unpack,
+)
 
 STRENGTH, SIN_DIP, FIELD_LAG, REGRESSOR_LAG = range(CORRECTION_SIZE, CORRECTION_SIZE + 4)
 TILT, LEAN = (
     slice(CORRECTION_SIZE + 4, CORRECTION_SIZE + 6),
     slice(CORRECTION_SIZE + 6, CORRECTION_SIZE + 8),
 )
+NUISANCE = slice(CORRECTION_SIZE + 4, CORRECTION_SIZE + 8)
 SIZE = CORRECTION_SIZE + 8
+"""Parameters where the control quantity has one part; other parts' motor vectors follow."""
 
 DIAGONAL, OFF_DIAGONAL = slice(6, 9), slice(9, 12)
 
@@ -64,7 +76,7 @@ def rows_of(
 
 def _rows(samples: Samples, parameters: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Residuals, their derivatives, and their change by one unit of u, as they come."""
-    correction = unpack(parameters[:CORRECTION_SIZE])
+    correction = correction_at(parameters)
     strength, sine = parameters[STRENGTH], np.clip(parameters[SIN_DIP], -0.999, 0.999)
     cosine = np.sqrt(1.0 - sine**2)
     inverse: FloatArray = np.linalg.inv(correction.soft_iron).astype(np.float64)
@@ -76,7 +88,7 @@ def _rows(samples: Samples, parameters: FloatArray) -> tuple[FloatArray, FloatAr
     axes = _axes(earth, down, inverse)
     apart = (corrected - earth) @ inverse.T
     pulled = [axis @ inverse for axis in axes]
-    slopes = np.empty((len(samples), 2, SIZE))
+    slopes = np.empty((len(samples), 2, len(parameters)))
     leaning = _leaning(samples)
     for kind in range(2):
         # A turn w of the body moves the field in body axes by w × b, which b × pulled weighs.
@@ -85,20 +97,23 @@ def _rows(samples: Samples, parameters: FloatArray) -> tuple[FloatArray, FloatAr
         slopes[:, kind, LEAN] = -turned[:, :2] * leaning
         slopes[:, kind, FIELD_LAG] = np.einsum("ij,ij->i", turned, _cross(down, samples.down_rate))
     values = np.stack([np.einsum("ij,ij->i", axis, apart) for axis in axes], axis=1)
-    values += slopes[:, :, CORRECTION_SIZE + 4 :] @ parameters[CORRECTION_SIZE + 4 :]
-    pulls = np.stack([one @ correction.motor for one in pulled], axis=1)
-    centred = (earth - np.multiply.outer(samples.u, correction.motor)) @ inverse.T
+    values += slopes[:, :, NUISANCE] @ parameters[NUISANCE]
+    pulls = np.stack([one @ correction.motor[:, 0] for one in pulled], axis=1)
+    centred = (earth - correction.added(samples.u)) @ inverse.T
+    pulled_rate = correction.added(samples.u_rate)
     for kind, (axis, pull) in enumerate(zip(axes, pulled, strict=True)):
         rows = slopes[:, kind, :]
-        rows[:, MOTOR] = pull * samples.u[:, None]
+        rows[:, MOTOR] = pull * samples.u[:, :1]
+        for part, column in enumerate(range(SIZE, rows.shape[1], 3), start=1):
+            rows[:, column : column + 3] = pull * samples.u[:, part : part + 1]
         rows[:, OFFSET] = axis
         rows[:, DIAGONAL] = pull * centred
         for column, (i, j) in enumerate(((0, 1), (0, 2), (1, 2)), start=9):
             rows[:, column] = pull[:, i] * centred[:, j] + pull[:, j] * centred[:, i]
         rows[:, STRENGTH] = -np.einsum("ij,ij->i", pull, earth) / strength
         rows[:, SIN_DIP] = -strength * np.einsum("ij,ij->i", pull, down - sine / cosine * north)
-        rows[:, REGRESSOR_LAG] = (
-            np.einsum("ij,ij->i", axis, samples.raw_rate) - pulls[:, kind] * samples.u_rate
+        rows[:, REGRESSOR_LAG] = np.einsum("ij,ij->i", axis, samples.raw_rate) - np.einsum(
+            "ij,ij->i", pull, pulled_rate
         )
     return values, slopes, pulls
 
@@ -139,7 +154,17 @@ def _leaning(samples: Samples) -> FloatArray:
 def errors_of(samples: Samples, parameters: FloatArray) -> Noise | None:
     """The sizes of the errors at parameters near the solution, shape (SIZE,)."""
     values, _, pulls = _rows(samples, parameters)
-    return noise_of(values, pulls, float(np.std(samples.u)))
+    return noise_of(values, pulls, float(np.std(samples.u[:, 0])))
+
+
+def correction_at(parameters: FloatArray) -> Correction:
+    """The correction among the parameters."""
+    return unpack(np.delete(parameters, slice(CORRECTION_SIZE, SIZE)))
+
+
+def indices_of_correction(size: int) -> IntArray:
+    """Where among so many parameters those of :func:`magcomp.model.pack` stand."""
+    return np.delete(np.arange(size), slice(CORRECTION_SIZE, SIZE))
 
 
 def lags_of(parameters: FloatArray) -> Lags:

@@ -33,6 +33,7 @@ from magcomp.fit.field_model import (
     SIZE,
     STRENGTH,
     TILT,
+    correction_at,
     errors_of,
     lags_of,
     rows_of,
@@ -63,7 +64,6 @@ from magcomp.model import (
     Samples,
     pack,
     symmetric,
-    unpack,
 )
 
 TILT_WIDTH_RAD = np.radians(0.5)
@@ -289,7 +289,7 @@ def with_wander(problem: Problem, found: FlightEstimate, free: int) -> tuple[Fli
     def rows(parameters: FloatArray) -> Rows:
         samples = problem.sample(lags_of(parameters))
         values, slopes, pulls = rows_of(samples, parameters, found.errors)
-        return Rows(samples.time, values, slopes, pulls * float(np.std(samples.u)))
+        return Rows(samples.time, values, slopes, pulls * float(np.std(samples.u[:, 0])))
 
     calibrated = is_calibrated(problem.readings.in_force[-1].correction)
     each: dict[int, Posterior] = {}
@@ -380,4 +380,4 @@ def is_physical(parameters: FloatArray) -> bool:
 
 def correction_of(found: Estimate) -> Correction:
     """The correction among the parameters."""
-    return unpack(found.parameters[:CORRECTION_SIZE])
+    return correction_at(found.parameters)

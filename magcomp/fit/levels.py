@@ -55,7 +55,7 @@ def usable_levels(problem: Problem) -> tuple[Samples, IntArray]:
         Level 0 … k − 1 of each row, in order of the control quantity; empty where none is usable.
     """
     samples = problem.sample(Lags(0.0, 0.0))
-    level = steady_levels(problem.control.series, samples)
+    level = steady_levels(problem.control.total, samples)
     kept = [k for k in range(int(level.max(initial=-1)) + 1) if _covered(samples, level == k)]
     rows = np.isin(level, kept)
     return samples.where(rows), np.searchsorted(np.array(kept, dtype=np.intp), level[rows])
@@ -122,7 +122,7 @@ def fit_levels(
 
 
 def _level(samples: Samples, rows: BoolArray, ellipsoids: Ellipsoids, index: int) -> Level:
-    u = samples.u[rows]
+    u = samples.total[rows]
     return Level(
         u=float(u.mean()),
         u_std=float(np.hypot(u.std() / np.sqrt(len(u)), _U_FLOOR)),
@@ -190,8 +190,8 @@ def centres_of_flight(
     In each bin the corrected field may be off by one body-fixed vector δ. To first order
     r₁ = along · δ and r₂ = down · δ; the bin's centre is the correction's less D⁻¹ δ.
     """
-    edges = np.unique(np.quantile(samples.u, np.linspace(0.0, 1.0, bins + 1)))
-    bin_of = np.clip(np.searchsorted(edges, samples.u, side="right") - 1, 0, len(edges) - 2)
+    edges = np.unique(np.quantile(samples.total, np.linspace(0.0, 1.0, bins + 1)))
+    bin_of = np.clip(np.searchsorted(edges, samples.total, side="right") - 1, 0, len(edges) - 2)
     corrected = correction.apply(samples.raw, samples.u)
     along = corrected / np.linalg.norm(corrected, axis=1, keepdims=True)
     directions = np.stack([along, samples.down], axis=1)
@@ -203,7 +203,7 @@ def centres_of_flight(
         if np.count_nonzero(rows) < _LEAST_IN_BIN:
             continue
         delta, covariance = _leftover(directions[rows], left[rows], noise)
-        u = samples.u[rows]
+        u = samples.total[rows]
         levels.append(
             Level(
                 u=float(u.mean()),

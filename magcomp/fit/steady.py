@@ -27,15 +27,15 @@ def steady_levels(control: Series, samples: Samples) -> IntArray:
     samples
         Readings with their control quantity.
     """
-    span = float(np.ptp(samples.u))
+    span = float(np.ptp(samples.total))
     level = np.full(len(samples), -1, dtype=np.intp)
     if span <= 0.0:
         return level
     steady = _change(control, samples) < STEADY_SHARE * span
     if not steady.any():
         return level
-    order = np.argsort(samples.u[steady], kind="stable")
-    values = samples.u[steady][order]
+    order = np.argsort(samples.total[steady], kind="stable")
+    values = samples.total[steady][order]
     group = np.concatenate([[0], np.cumsum(np.diff(values) > _SPLIT_SHARE * span)])
     numbers = np.full(len(order), -1, dtype=np.intp)
     count = 0
@@ -59,5 +59,5 @@ def _change(control: Series, samples: Samples) -> FloatArray:
     bounds = np.column_stack([first[seen], last[seen]]).reshape(-1)
     highest = np.maximum.reduceat(padded, bounds)[::2]
     lowest = np.minimum.reduceat(padded, bounds)[::2]
-    change[seen] = np.maximum(highest - samples.u[seen], samples.u[seen] - lowest)
+    change[seen] = np.maximum(highest - samples.total[seen], samples.total[seen] - lowest)
     return change

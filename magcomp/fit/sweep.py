@@ -59,7 +59,7 @@ def is_still(samples: Samples) -> bool:
     tilt = np.quantile(np.abs(samples.attitude[:, :2] - middle), 0.95, axis=0)
     if np.any(tilt > STILL_TILT_RAD) or _wobble(samples) > STILL_WOBBLE_RAD:
         return False
-    design = np.column_stack([np.ones(len(samples)), samples.u])
+    design = np.column_stack([np.ones(len(samples)), samples.total])
     line = np.linalg.lstsq(design, samples.raw, rcond=None)[0]
     left = np.linalg.norm(samples.raw - design @ line, axis=1)
     strength = float(np.median(np.linalg.norm(samples.present, axis=1)))
@@ -100,12 +100,12 @@ def fit_sweep(problem: Problem, *, lag: float | None = None) -> MotorFit:
     begin = np.zeros(_SIZE)
     begin[_LAG] = _nearest_lag(problem) if lag is None else lag
     at_start = problem.sample(Lags(0.0, float(begin[_LAG])))
-    if not np.ptp(at_start.u) > 0.0:
+    if not np.ptp(at_start.total) > 0.0:
         raise FitRejectedError(
             f"The {problem.control.kind} must change during a sweep; instead it stayed at "
-            f"{at_start.u[0]:.2f}"
+            f"{at_start.total[0]:.2f}"
         )
-    design = np.column_stack([np.ones(len(at_start)), at_start.u])
+    design = np.column_stack([np.ones(len(at_start)), at_start.total])
     begin[:6] = np.linalg.lstsq(design, at_start.raw, rcond=None)[0].reshape(-1)
     width = np.full(_SIZE, np.inf)
     width[_LAG] = LAG_WIDTH_S if lag is None else 0.0
@@ -114,12 +114,14 @@ def fit_sweep(problem: Problem, *, lag: float | None = None) -> MotorFit:
 
     def residuals(parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
         rows = problem.sample(Lags(0.0, float(parameters[_LAG])))
-        left = rows.raw - parameters[_START] - np.multiply.outer(rows.u, parameters[_SLOPE])
+        left = rows.raw - parameters[_START] - np.multiply.outer(rows.total, parameters[_SLOPE])
         slopes = np.zeros((len(rows), 3, _SIZE))
         for axis in range(3):
             slopes[:, axis, axis] = -1.0
-            slopes[:, axis, 3 + axis] = -rows.u
-        slopes[:, :, _LAG] = rows.raw_rate + np.multiply.outer(rows.u_rate, parameters[_SLOPE])
+            slopes[:, axis, 3 + axis] = -rows.total
+        slopes[:, :, _LAG] = rows.raw_rate + np.multiply.outer(
+            rows.u_rate[:, 0], parameters[_SLOPE]
+        )
         return left, slopes
 
     found = solve(
@@ -137,7 +139,7 @@ def _nearest_lag(problem: Problem) -> float:
 
     def left(lag: float) -> float:
         rows = problem.sample(Lags(0.0, lag))
-        design = np.column_stack([np.ones(len(rows)), rows.u])
+        design = np.column_stack([np.ones(len(rows)), rows.total])
         line = np.linalg.lstsq(design, rows.raw, rcond=None)[0]
         return float(np.sum(np.abs(rows.raw - design @ line)))
 
@@ -181,8 +183,8 @@ def _answer(
         noise=noise,
         levels=levels,
         line=line_through(levels) if len(levels) > 1 else None,
-        u_low=float(np.quantile(samples.u, 0.02)),
-        u_high=float(np.quantile(samples.u, 0.98)),
+        u_low=float(np.quantile(samples.total, 0.02)),
+        u_high=float(np.quantile(samples.total, 0.98)),
         count=len(samples),
     )
 
@@ -205,17 +207,17 @@ def _levels(
 ) -> tuple[Level, ...]:
     """Mean raw field at each steady level, as a centre; the ends of the range where none is."""
     moved = samples.raw - parameters[_START] - present.offset
-    level = steady_levels(problem.control.series, samples)
+    level = steady_levels(problem.control.total, samples)
     groups = [level == k for k in range(int(level.max(initial=-1)) + 1)]
     if len(groups) < 2:
-        middle = np.median(samples.u)
-        groups = [samples.u <= middle, samples.u > middle]
+        middle = np.median(samples.total)
+        groups = [samples.total <= middle, samples.total > middle]
     levels = []
     for rows in groups:
         count = int(np.count_nonzero(rows))
         if count == 0:
             continue
-        u = samples.u[rows]
+        u = samples.total[rows]
         levels.append(
             Level(
                 u=float(u.mean()),

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from magcomp.fit.field_model import SIZE, TILT
+from magcomp.fit.field_model import TILT
 from magcomp.fit.robust import Prior, spread_of
 from magcomp.model import OFFSET, FloatArray, IntArray
 
@@ -334,7 +334,7 @@ def mixed(found: Iterable[Posterior]) -> Posterior:
     weights = np.array([np.exp(one.evidence - best.evidence) for one in each])
     weights /= weights.sum()
     mean = np.sum([w * one.parameters for w, one in zip(weights, each, strict=True)], axis=0)
-    covariance = np.zeros((SIZE, SIZE))
+    covariance = np.zeros_like(best.covariance)
     for weight, one in zip(weights, each, strict=True):
         apart = one.parameters - mean
         covariance += weight * (one.covariance + np.outer(apart, apart))

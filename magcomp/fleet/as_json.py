@@ -11,7 +11,7 @@ from magcomp.fleet.aircraft import Aircraft
 from magcomp.fleet.answer import Fleet
 from magcomp.fleet.flights import Flight
 from magcomp.fleet.history import CompassHistory
-from magcomp.model import UNITS
+from magcomp.model import unit_of
 
 
 def fleet_object(fleet: Fleet) -> dict[str, Any]:
@@ -55,7 +55,7 @@ def _compass(history: CompassHistory) -> dict[str, Any]:
         "compass": history.compass,
         "device_id": history.device_id,
         "regressor": history.regressor,
-        "unit": UNITS.get(history.regressor, ""),
+        "unit": unit_of(history.regressor),
         "in_force_holds": history.holds.name.lower(),
         "drift_deg": history.drift_deg,
         "pooled": None

@@ -12,7 +12,7 @@ import numpy as np
 from magcomp.fleet.flights import Flight
 from magcomp.fleet.pooled import SURE, Pooled, chances_apart, change, pool
 from magcomp.judge.thresholds import Thresholds
-from magcomp.model import UNITS, Grade
+from magcomp.model import Grade, unit_of
 from magcomp.model.recording import FloatArray, IntArray
 
 _COVARIANCE = np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2]])
@@ -319,7 +319,7 @@ def why(flight: Flight, others: Sequence[Flight], degrees: float) -> str:
 
 def quantity(u: float, regressor: str) -> str:
     """A control quantity for people."""
-    unit = UNITS.get(regressor, "")
+    unit = unit_of(regressor)
     return f"{u:.0f} {unit}" if unit else f"{100 * u:.0f} % throttle"
 
 

@@ -191,7 +191,7 @@ def with_motor(fit: MotorFit, motor: FloatArray) -> MotorFit:
     """
     correction = fit.correction
     middle = (fit.u_low + fit.u_high) / 2
-    moved = np.linalg.solve(correction.soft_iron, correction.motor - motor) * middle
+    moved = np.linalg.solve(correction.soft_iron, correction.vector - motor) * middle
     return replace(
         fit, correction=replace(correction, offset=correction.offset + moved, motor=motor)
     )

@@ -155,11 +155,11 @@ def departures_of(problem: Problem, fit: MotorFit, lags: Lags) -> tuple[Departur
     values, slopes = strength_and_dip(samples, parameters)
     linear = _weighted(problem, values, slopes)
     horizontal = float(np.sqrt(max(fit.strength**2 - fit.vertical**2, 1.0)))
-    top = float(np.quantile(samples.u, 0.98))
+    top = float(np.quantile(samples.total, 0.98))
     if top <= 0.0:
         return ()
     weight = linear.slopes[:, :, OFFSET], linear.slopes[:, :, MOTOR] / top
-    share = np.clip(samples.u / top, 0.0, 2.0)[:, None, None]
+    share = np.clip(samples.total / top, 0.0, 2.0)[:, None, None]
     wide = _WIDEST * fit.strength
     curved, covariance, gain = linear.taken_up(weight[1] * share, wide)
     # The bow of q·s² over 0 … 1 departs from its best line by q/8.

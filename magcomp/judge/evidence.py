@@ -49,7 +49,7 @@ def field_residual(problem: Problem, fit: MotorFit) -> tuple[FieldResidual, Floa
             continue
         left.append(_left(part, seen, unseen))
         before_left.append(_left_before(fit, seen, unseen))
-        motors.append(part.correction.motor)
+        motors.append(part.correction.vector)
     if len(motors) < _LEAST_FOLDS:
         raise FitRejectedError(
             f"A fit needs at least {_LEAST_FOLDS} stretches that can be held out in turn; instead "
@@ -95,15 +95,15 @@ def cover(samples: Samples, corrected: FloatArray) -> Coverage:
     """
     yaw = _field_heading(corrected, samples)
     tilt = np.degrees(np.arccos(np.clip(samples.down[:, 2], -1.0, 1.0)))
-    steps = np.diff(samples.time)
+    steps, total = np.diff(samples.time), samples.total
     return Coverage(
         sphere=_sphere_share(corrected),
         heading=len(np.unique(np.floor(yaw / (2 * np.pi) * _HEADING_SECTORS))) / _HEADING_SECTORS,
         tilt_deg=float(np.quantile(tilt, 0.98)),
-        u_low=float(np.quantile(samples.u, 0.02)),
-        u_high=float(np.quantile(samples.u, 0.98)),
+        u_low=float(np.quantile(total, 0.02)),
+        u_high=float(np.quantile(total, 0.98)),
         seconds=float(np.sum(steps[steps < _GAP_S])),
-        u_median=float(np.median(samples.u[samples.u >= _IDLE_SHARE * samples.u.max()])),
+        u_median=float(np.median(total[total >= _IDLE_SHARE * total.max()])),
     )
 
 

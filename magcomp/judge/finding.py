@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from magcomp.model import CURRENT, Grade
+from magcomp.model import Grade
 
 
 @dataclass(frozen=True)
@@ -26,14 +26,3 @@ class Finding:
 def severity(grade: Grade) -> int:
     """0 for good, more for worse."""
     return (Grade.GOOD, Grade.MARGINAL, Grade.REJECTED).index(grade)
-
-
-def quantity(kind: str, u: float) -> str:
-    """A control quantity in words.
-
-    Examples
-    --------
-    >>> quantity("current", 24.3), quantity("throttle", 0.5)
-    ('24 A', '50 % throttle')
-    """
-    return f"{u:.0f} A" if kind == CURRENT else f"{u * 100:.0f} % throttle"

@@ -6,13 +6,10 @@ from collections.abc import Iterator
 
 from magcomp.judge.finding import Finding
 from magcomp.judge.thresholds import Thresholds
-from magcomp.model import CURRENT, Coverage, Grade
+from magcomp.model import Coverage, Grade, quantity_of
 
 _HOVERS = 0.4
 """A vehicle that stays in the air never lets its motors idle: this share of its highest control."""
-
-_IDLE_A = 1.0
-"""The electronics alone of a vehicle this work is for draw about as much."""
 
 
 def on_control(
@@ -36,23 +33,21 @@ def on_control(
     A hover's narrow range may still do where the motors add little: the bound knows. Where the
     motors hardly ran, nothing is known of how they run in the air.
     """
-    span = covered.u_high - covered.u_low
-    running = kind != CURRENT or covered.u_high > _IDLE_A
+    quantity = quantity_of(kind)
+    least = quantity.of(current=limits.least_current_a, throttle=limits.least_throttle)
+    running = covered.u_high > quantity.idle
     hovering = running and covered.u_low > _HOVERS * covered.u_high
     grade = Grade.MARGINAL if hovering and known else Grade.REJECTED
-    if kind == CURRENT and span < limits.least_current_a:
+    if covered.u_high - covered.u_low >= least:
+        return
+    top = quantity.text(covered.u_high)
+    if covered.u_high < quantity.flies:
+        yield Finding(Grade.REJECTED, f"the {kind} never rose above {top}: fly a climb")
+    else:
         yield Finding(
             grade,
-            f"the current only ranged from {covered.u_low:.0f} to {covered.u_high:.0f} A: "
-            "fly climbs and descents so that the motors work harder and less hard",
-        )
-    elif kind != CURRENT and span < limits.least_throttle:
-        yield Finding(
-            Grade.REJECTED if covered.u_high < 0.3 else grade,
-            f"the throttle never rose above {covered.u_high * 100:.0f} %: fly a climb"
-            if covered.u_high < 0.3
-            else f"the throttle only ranged from {covered.u_low * 100:.0f} to "
-            f"{covered.u_high * 100:.0f} %: fly climbs and descents",
+            f"the {kind} only ranged from {quantity.scale * covered.u_low:.0f} to {top}: "
+            f"{quantity.how_to_vary}",
         )
 
 

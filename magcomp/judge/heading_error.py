@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
+from magcomp.align import interpolate
 from magcomp.geometry import body_from_earth, heading_shift, level_matrix, wrap_angle
 from magcomp.model import (
     CORRECTION_SIZE,
-    CURRENT,
     MOTOR,
     OFFSET,
     SOFT_IRON,
+    Control,
     Correction,
     FloatArray,
     HeadingError,
     MotorFit,
+    Samples,
+    quantity_of,
     symmetric,
 )
 
@@ -23,9 +28,6 @@ TILT_RAD = np.radians(20.0)
 
 _YAWS = np.radians(np.arange(0.0, 360.0, 10.0))
 _DRAWS = 400
-_MOST_ROWS = 50
-_CURRENTS = (0.0, 10.0, 20.0, 30.0, 40.0, 50.0)
-_THROTTLES = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
 
 
 def attitudes() -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -37,13 +39,38 @@ def attitudes() -> tuple[FloatArray, FloatArray, FloatArray]:
 
 def control_grid(fit: MotorFit) -> FloatArray:
     """Control quantities a table of heading errors is given at."""
-    grid = _CURRENTS if fit.regressor == CURRENT else _THROTTLES
-    step = grid[1]
-    if fit.regressor == CURRENT and fit.u_high > grid[-1] + step / 2:
-        # A monitor that claims a million amperes gets no million rows.
-        step *= max(1.0, np.ceil(fit.u_high / (step * _MOST_ROWS)))
-        return np.arange(0.0, fit.u_high + step / 2, step)
-    return np.array(grid)
+    return quantity_of(fit.regressor).rows(fit.u_high)
+
+
+def multiplied_in_force(
+    u: FloatArray,
+    kind: str | None,
+    fit: MotorFit,
+    controls: Mapping[str, Control],
+    samples: Samples,
+) -> FloatArray:
+    """What the motor correction in force multiplies at each control quantity, shape (k,).
+
+    Parameters
+    ----------
+    u
+        Of the fit, shape (k,).
+    kind
+        The control quantity that the correction in force multiplies; None where it is off.
+    fit, samples
+        The fit, and the readings at its lags.
+    controls
+        The control quantities as the autopilot reported them.
+
+    Notes
+    -----
+    Another quantity than the fit's own is taken as a straight line of it, as the recording shows.
+    """
+    if kind in (None, fit.regressor) or kind not in controls:
+        return u
+    other = interpolate(controls[kind].series, samples.time - samples.lags.regressor)
+    slope, intercept = np.polyfit(samples.total, other, 1)
+    return np.asarray(np.maximum(intercept + slope * u, 0.0))
 
 
 def heading_errors(
@@ -63,7 +90,7 @@ def heading_errors(
     present
         The correction in force.
     present_u
-        What ``present.motor`` is multiplied by at each control quantity of
+        What ``present``'s motor vector is multiplied by at each control quantity of
         :func:`control_grid`, shape (k,).
     rng
         For the draws from the covariance.
@@ -76,16 +103,14 @@ def heading_errors(
     Equation 7, on draws of all 12 parameters.
     """
     roll, pitch, yaw = attitudes()
-    horizontal = np.sqrt(max(fit.strength**2 - fit.vertical**2, 1.0))
-    earth = np.array([horizontal, 0.0, fit.vertical])
-    field = body_from_earth(roll, pitch, yaw) @ earth
+    field = _field_at(fit, roll, pitch, yaw)
     draws = rng.multivariate_normal(
         np.zeros(CORRECTION_SIZE), fit.covariance, size=_DRAWS, method="eigh"
     )
     inverse = np.linalg.inv(fit.correction.soft_iron)
     rows = []
     for u, u_present in zip(control_grid(fit), present_u, strict=True):
-        raw = (field - u * fit.correction.motor) @ inverse.T - fit.correction.offset
+        raw = (field - u * fit.correction.vector) @ inverse.T - fit.correction.offset
         before = present.apply(raw, np.full(len(raw), u_present))
         slopes = _shift_slopes(field, raw + fit.correction.offset, roll, pitch, u, fit)
         off = shifts(before, field, roll, pitch)
@@ -110,9 +135,8 @@ def variance_shares(fit: MotorFit, u: float) -> dict[str, float]:
         Square radians by ``"motor"``, ``"offset"`` and ``"soft iron"``.
     """
     roll, pitch, yaw = attitudes()
-    horizontal = np.sqrt(max(fit.strength**2 - fit.vertical**2, 1.0))
-    field = body_from_earth(roll, pitch, yaw) @ np.array([horizontal, 0.0, fit.vertical])
-    centred = (field - u * fit.correction.motor) @ np.linalg.inv(fit.correction.soft_iron).T
+    field = _field_at(fit, roll, pitch, yaw)
+    centred = (field - u * fit.correction.vector) @ np.linalg.inv(fit.correction.soft_iron).T
     slopes = _shift_slopes(field, centred, roll, pitch, u, fit)
     worst = slopes[int(np.argmax(np.einsum("ki,ij,kj->k", slopes, fit.covariance, slopes)))]
     groups = {"motor": MOTOR, "offset": OFFSET, "soft iron": SOFT_IRON}
@@ -120,6 +144,36 @@ def variance_shares(fit: MotorFit, u: float) -> dict[str, float]:
         name: float(worst[part] @ fit.covariance[part, part] @ worst[part])
         for name, part in groups.items()
     }
+
+
+def level_errors(fit: MotorFit, present: Correction, u: float, present_u: float) -> FloatArray:
+    """Heading error of the correction in force over a level turn, at one control quantity.
+
+    Parameters
+    ----------
+    fit
+        Its correction is taken as the truth.
+    present
+        The correction in force.
+    u, present_u
+        The control quantity, and what ``present.motor`` is multiplied by there.
+
+    Returns
+    -------
+    ndarray, shape (36,)
+        Heading found less true heading, radians, at true headings 0°, 10° … 350°.
+    """
+    roll = np.zeros_like(_YAWS)
+    field = _field_at(fit, roll, roll, _YAWS)
+    raw = fit.correction.undo(field, np.full(len(field), u))
+    return shifts(present.apply(raw, np.full(len(raw), present_u)), field, roll, roll)
+
+
+def _field_at(fit: MotorFit, roll: FloatArray, pitch: FloatArray, yaw: FloatArray) -> FloatArray:
+    """The earth's field as found, in body axes at each attitude, mGauss, shape (k, 3)."""
+    horizontal = np.sqrt(max(fit.strength**2 - fit.vertical**2, 1.0))
+    earth = np.array([horizontal, 0.0, fit.vertical])
+    return np.asarray(body_from_earth(roll, pitch, yaw) @ earth)
 
 
 def largest_shift(

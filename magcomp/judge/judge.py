@@ -8,19 +8,17 @@ from functools import partial
 
 import numpy as np
 
-from magcomp.align import interpolate
 from magcomp.fit import Problem
 from magcomp.judge.evidence import cover, field_residual, used_lags
-from magcomp.judge.finding import Finding, quantity, severity
+from magcomp.judge.finding import Finding, severity
 from magcomp.judge.gates import on_control, on_turn, on_unseen_parameters
-from magcomp.judge.heading_error import control_grid, heading_errors
+from magcomp.judge.heading_error import control_grid, heading_errors, multiplied_in_force
 from magcomp.judge.keep import is_close, keep
 from magcomp.judge.lacking import lacking
 from magcomp.judge.thresholds import Thresholds
 from magcomp.judge.whole import on_constancy, on_earth
 from magcomp.model import (
     CORRECTION_SIZE,
-    CURRENT,
     MOTOR,
     OFFSET,
     Coverage,
@@ -31,6 +29,7 @@ from magcomp.model import (
     MotorFit,
     Samples,
     Verdict,
+    quantity_of,
 )
 
 DEFAULT_SEED = 20_240_601
@@ -85,7 +84,10 @@ def judge(
     fit = _widened(fit, motors)
     in_force = problem.readings.in_force[-1]
     table = partial(
-        heading_errors, fit, in_force.correction, _present_control(problem, samples, fit)
+        heading_errors,
+        fit,
+        in_force.correction,
+        multiplied_in_force(control_grid(fit), in_force.regressor, fit, problem.in_force, samples),
     )
     errors = table(rng)
     stays = in_force.regressor in (None, fit.regressor) and is_close(
@@ -133,23 +135,12 @@ def _widened(fit: MotorFit, motors: FloatArray) -> MotorFit:
 
 def _floor(fit: MotorFit) -> FloatArray:
     """Standard errors that no residual shows, of the 12 parameters."""
-    bent = fit.regressor != CURRENT and fit.method == "flight"
-    motor = (FLOOR_THROTTLE if bent else FLOOR_MOTOR) * float(np.linalg.norm(fit.correction.motor))
+    bent = not quantity_of(fit.regressor).is_straight and fit.method == "flight"
+    motor = (FLOOR_THROTTLE if bent else FLOOR_MOTOR) * float(np.linalg.norm(fit.correction.vector))
     floor = np.full(CORRECTION_SIZE, FLOOR_SOFT_IRON)
     floor[MOTOR] = motor
     floor[OFFSET] = np.hypot(FLOOR_OFFSET_MGAUSS, motor * fit.u_high / 2.0 if bent else 0.0)
     return floor
-
-
-def _present_control(problem: Problem, samples: Samples, fit: MotorFit) -> FloatArray:
-    """What the motor correction in force multiplies at each control quantity of the table."""
-    grid = control_grid(fit)
-    kind = problem.readings.in_force[-1].regressor
-    if kind in (None, fit.regressor) or kind not in problem.in_force:
-        return grid
-    other = interpolate(problem.in_force[kind].series, samples.time - samples.lags.regressor)
-    slope, intercept = np.polyfit(samples.u, other, 1)
-    return np.asarray(np.maximum(intercept + slope * grid, 0.0))
 
 
 def _findings(
@@ -221,7 +212,7 @@ def _on_bound(
     yield Finding(
         grade,
         f"the heading could still be wrong by {worst.p95:.1f}° at "
-        f"{quantity(fit.regressor, worst.u)}: {lacking(fit, samples, covered, worst.u)}",
+        f"{_quantity(fit, worst.u)}: {lacking(fit, samples, covered, worst.u)}",
     )
 
 
@@ -274,9 +265,13 @@ def error_at(errors: tuple[HeadingError, ...], u: float) -> HeadingError:
     return HeadingError(u, before, after, p95)
 
 
+def _quantity(fit: MotorFit, u: float) -> str:
+    return quantity_of(fit.regressor).in_sentence(u)
+
+
 def _summary(fit: MotorFit, errors: tuple[HeadingError, ...], residual: FieldResidual) -> str:
     at_top = error_at(errors, fit.u_high)
-    where = quantity(fit.regressor, at_top.u)
+    where = _quantity(fit, at_top.u)
     unseen = (
         f"on stretches it did not see, the unexplained field goes from "
         f"{residual.held_out_before:.1f} to {residual.held_out:.1f} mGauss"

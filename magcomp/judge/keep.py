@@ -35,12 +35,12 @@ def is_close(fit: MotorFit, present: Correction, errors: Sequence[HeadingError])
     if fit.method == "sweep":
         return False
     flown = [row for row in errors if row.u <= max(fit.u_high, errors[1].u)]
-    return all(row.before <= CLOSE * row.p95 for row in flown) and _is_likely(fit, present.motor)
+    return all(row.before <= CLOSE * row.p95 for row in flown) and _is_likely(fit, present.vector)
 
 
 def _is_likely(fit: MotorFit, motor: FloatArray) -> bool:
     """Whether the motor vector in force lies within what the fit allows."""
-    apart = motor - fit.correction.motor
+    apart = motor - fit.correction.vector
     inverse = np.linalg.pinv(fit.covariance[MOTOR, MOTOR], hermitian=True)
     return float(apart @ inverse @ apart) <= _CHI2_95_OF_3
 

@@ -6,9 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from magcomp.judge.finding import quantity
 from magcomp.judge.heading_error import variance_shares
-from magcomp.model import Coverage, FloatArray, MotorFit, Samples
+from magcomp.model import Coverage, FloatArray, MotorFit, Samples, quantity_of
 
 SECTORS = 36
 """Headings are counted in sectors of 10°."""
@@ -44,16 +43,17 @@ def lacking(fit: MotorFit, samples: Samples, covered: Coverage, u: float) -> str
 
 
 def _for_motors(fit: MotorFit, samples: Samples, covered: Coverage) -> str:
+    in_words = quantity_of(fit.regressor).in_sentence
     if covered.u_low > _HARDLY_CHANGES * covered.u_high:
-        low, high = quantity(fit.regressor, covered.u_low), quantity(fit.regressor, covered.u_high)
+        low, high = in_words(covered.u_low), in_words(covered.u_high)
         return (
             f"the motors only worked between {low} and {high}: "
             "climb hard, descend, and do both at several headings"
         )
     hard = covered.u_low + _HARD_SHARE * (covered.u_high - covered.u_low)
-    gap = widest_gap(samples.attitude[samples.u > hard, 2])
+    gap = widest_gap(samples.attitude[samples.total > hard, 2])
     if gap is not None:
-        above = quantity(fit.regressor, hard)
+        above = in_words(hard)
         return (
             f"headings {_named(gap)} were never seen above {above}: climb hard while facing there"
         )

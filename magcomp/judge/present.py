@@ -14,7 +14,7 @@ from magcomp.fit import (
 )
 from magcomp.geometry import body_from_earth
 from magcomp.judge.evidence import cover
-from magcomp.judge.finding import Finding, quantity, severity
+from magcomp.judge.finding import Finding, severity
 from magcomp.judge.gates import on_control, on_duration, on_turn, on_unseen_parameters
 from magcomp.judge.heading_error import attitudes, largest_shift
 from magcomp.judge.thresholds import Thresholds
@@ -27,6 +27,7 @@ from magcomp.model import (
     Level,
     Samples,
     Verdict,
+    quantity_of,
 )
 
 _MAD_TO_STD = 1.4826
@@ -112,14 +113,14 @@ def _on_stillness() -> tuple[Finding, ...]:
 
 def _still_levels(samples: Samples, present: Correction, noise: float) -> tuple[Level, ...]:
     """Mean departure of the field from its value at the lowest control quantity, as centres."""
-    edges = np.linspace(samples.u.min(), samples.u.max(), _BINS + 1)
-    bin_of = np.clip(np.searchsorted(edges, samples.u, side="right") - 1, 0, _BINS - 1)
+    edges = np.linspace(samples.total.min(), samples.total.max(), _BINS + 1)
+    bin_of = np.clip(np.searchsorted(edges, samples.total, side="right") - 1, 0, _BINS - 1)
     inverse = np.linalg.inv(present.soft_iron)
     rest = np.median(samples.present[bin_of == bin_of.min()], axis=0)
     levels = []
     for index in np.unique(bin_of):
         rows = bin_of == index
-        u = float(np.mean(samples.u[rows]))
+        u = float(np.mean(samples.total[rows]))
         delta = np.median(samples.present[rows], axis=0) - rest
         count = int(np.count_nonzero(rows))
         levels.append(
@@ -161,7 +162,7 @@ def _measured(errors: tuple[HeadingError, ...], kind: str, limits: Thresholds) -
             Grade.REJECTED, "the recording is too short to judge the calibration in force"
         )
     worst = max(errors, key=lambda row: row.before)
-    where = quantity(kind, worst.u)
+    where = quantity_of(kind).in_sentence(worst.u)
     found = (
         f"with the calibration in force the heading is wrong by up to {worst.before:.1f}° at "
         f"{where} (at most {worst.p95:.1f}° with 95 %)"

@@ -3,6 +3,7 @@
 ====================  ==============================================================
 udp:HOST:PORT         listen on HOST:PORT and answer whoever speaks (same as udpin:)
 udp:PORT              the same for this computer only; 0.0.0.0 as HOST for the network
+HOST:PORT, :PORT      the same as udp:HOST:PORT and udp:PORT; HOST must be in numbers
 udpout:HOST:PORT      speak first to HOST:PORT
 tcp:HOST:PORT         connect to HOST:PORT
 tcpin:HOST:PORT       listen on HOST:PORT for one connection; tcpin:PORT as with udp:
@@ -14,9 +15,11 @@ FLIGHT.tlog[,10x]     replay of a recorded log, at real time or faster
 
 from __future__ import annotations
 
+import ipaddress
 import math
 import re
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
 
 from serial.tools import list_ports
@@ -49,6 +52,11 @@ class UdpServer:
     def __str__(self) -> str:
         return f"udp:{_join(self.host, self.port)}"
 
+    @property
+    def meaning(self) -> str:
+        """What is done there, in words."""
+        return f"listen for UDP {_reach(self.host)}, and answer who speaks"
+
 
 @dataclass(frozen=True)
 class UdpClient:
@@ -59,6 +67,11 @@ class UdpClient:
 
     def __str__(self) -> str:
         return f"udpout:{_join(self.host, self.port)}"
+
+    @property
+    def meaning(self) -> str:
+        """What is done there, in words."""
+        return "speak first, by UDP"
 
 
 @dataclass(frozen=True)
@@ -71,6 +84,11 @@ class TcpClient:
     def __str__(self) -> str:
         return f"tcp:{_join(self.host, self.port)}"
 
+    @property
+    def meaning(self) -> str:
+        """What is done there, in words."""
+        return "connect by TCP"
+
 
 @dataclass(frozen=True)
 class TcpServer:
@@ -81,6 +99,11 @@ class TcpServer:
 
     def __str__(self) -> str:
         return f"tcpin:{_join(self.host, self.port)}"
+
+    @property
+    def meaning(self) -> str:
+        """What is done there, in words."""
+        return f"listen for one TCP connection {_reach(self.host)}"
 
 
 @dataclass(frozen=True)
@@ -117,6 +140,7 @@ _NETWORK: dict[str, type[UdpServer | UdpClient | TcpClient | TcpServer]] = {
 
 
 _LISTENING = (UdpServer, TcpServer)
+_IPV6 = 6
 LOOPBACK = "127.0.0.1"
 """Where a listening address without a host is: nobody elsewhere may speak to it unasked."""
 
@@ -147,7 +171,8 @@ def parse_address(text: str, *, baud: int | None = None, speed: float | None = N
         When ``text`` is none of these. Nothing is guessed; the message shows examples.
     """
     text = text.strip()
-    scheme, colon, rest = text.partition(":")
+    full = f"udp:{text}" if _without_scheme(text) else text
+    scheme, colon, rest = full.partition(":")
     if colon and scheme.lower() in _NETWORK:
         _refuse_baud(text, baud)
         kind = _NETWORK[scheme.lower()]
@@ -181,14 +206,46 @@ def serial_ports() -> tuple[SerialPort, ...]:
     )
 
 
+def _without_scheme(text: str) -> bool:
+    """Whether this is [HOST]:PORT and no more; a name as HOST could be a misspelt scheme."""
+    host, colon, port = text.rpartition(":")
+    return bool(colon) and _digits(port) and (not host or _is_numeric(host))
+
+
+def _is_numeric(host: str) -> bool:
+    inner = host[1:-1] if host.startswith("[") and host.endswith("]") else host
+    try:
+        found = ipaddress.ip_address(inner)
+    except ValueError:
+        return False
+    return (found.version == _IPV6) == (inner is not host)
+
+
+def _reach(host: str) -> str:
+    """Who can speak to a listener there."""
+    if not _is_numeric(_bracketed(host)):
+        return f"at {host}"
+    found = ipaddress.ip_address(host)
+    if found.is_loopback:
+        return "from this computer only"
+    return "from the whole network" if found.is_unspecified else f"at {host}"
+
+
 def _not_an_address(text: str) -> AddressError:
+    scheme, colon, rest = text.partition(":")
+    near = get_close_matches(scheme.lower(), _NETWORK, n=1) if colon else []
+    guess = f" Did you mean '{near[0]}:{rest}'?" if near and near[0] != scheme.lower() else ""
     return AddressError(
-        f"An address must look like one of {', '.join(EXAMPLES)}; instead received {text!r}."
+        f"An address must look like one of {', '.join(EXAMPLES)}; instead received {text!r}.{guess}"
     )
 
 
 def _join(host: str, port: int) -> str:
-    return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+    return f"{_bracketed(host)}:{port}"
+
+
+def _bracketed(host: str) -> str:
+    return f"[{host}]" if ":" in host else host
 
 
 def _host_and_port(rest: str, text: str) -> tuple[str, int]:

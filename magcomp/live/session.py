@@ -12,7 +12,7 @@ import threading
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Self, TypeVar
 
 from magcomp.analysis.analyse import Options, Progress, analyse
 from magcomp.buffer import Buffer
@@ -36,7 +36,10 @@ from magcomp.live.upload import finish_restore, make_plan, read_backup, wait_dis
 from magcomp.live.watch import LOOK_S, Watch
 from magcomp.model import Analysis, ParameterSet, Recording, Vehicle
 from magcomp.writing.events import Event, Outcome
+from magcomp.writing.files import is_own
 from magcomp.writing.plan import WritePlan
+
+_Result = TypeVar("_Result")
 
 
 def _silent(_: object) -> None:
@@ -281,13 +284,25 @@ class LiveSession:
             self._refitter.close()
         self._tap.stop()
 
+    def alone(self, work: Callable[[Connection, Vehicle, Latest, Clock], _Result]) -> _Result:
+        """Let somebody speak with the vehicle while nobody else does; see magcomp.live.sweep."""
+        with self._asked:
+            self.connection.discard()
+            return work(self.connection, self._known_vehicle(), self._tap.latest, self._clock)
+
     # ---------------------------------------------------------------- writing
 
-    def upload_plan(self, wanted: ParameterSet, any_vehicle: bool = False) -> WritePlan:
+    def upload_plan(
+        self, wanted: ParameterSet, any_vehicle: bool = False, everything: bool = False
+    ) -> WritePlan:
         """Read the vehicle's calibration and compare; see ``session.upload.make_plan``."""
         with self._asked:
             return make_plan(
-                self.connection, self._known_vehicle(), wanted, any_vehicle=any_vehicle
+                self.connection,
+                self._known_vehicle(),
+                wanted,
+                any_vehicle=any_vehicle,
+                everything=everything,
             )
 
     def restore_plan(self, backup: Path, any_vehicle: bool = False) -> WritePlan:
@@ -298,7 +313,8 @@ class LiveSession:
         ParameterFileError
             The backup is missing or none; otherwise as ``upload_plan``.
         """
-        return self.upload_plan(read_backup(backup)[0], any_vehicle)
+        wanted = read_backup(backup)[0]
+        return self.upload_plan(wanted, any_vehicle, everything=is_own(wanted))
 
     def upload(
         self,

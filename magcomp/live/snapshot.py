@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 
 from magcomp import autopilots
-from magcomp.autopilots import Autopilot
 from magcomp.buffer import Coverage
 from magcomp.geometry import heading
 from magcomp.link import LinkStatistics
@@ -19,7 +18,7 @@ from magcomp.live.latest import Now, Vector
 from magcomp.live.progress import Bound
 from magcomp.live.refit import Refit
 from magcomp.live.situation import Situation
-from magcomp.model import THROTTLE, Analysis, Grade, InForce, MotorFit, Series, Vehicle
+from magcomp.model import Analysis, Grade, InForce, MotorFit, Series, Vehicle, quantity_of
 
 _PLAUSIBLE = (150.0, 900.0)
 """mGauss: the earth's field is 220 … 670; motors and a bad calibration add to it."""
@@ -190,7 +189,7 @@ def compasses_now(
 
 def _applied(raw: Vector, now: Now, present: InForce) -> Vector | None:
     """What the vehicle makes of a sensor's own field."""
-    u = now.throttle if present.regressor == THROTTLE else now.current
+    u = _control(present.regressor, now)
     if u is None and present.correction.motor.any():
         return None
     x, y, z = present.correction.apply(np.array([raw]), np.array([u or 0.0]))[0].tolist()
@@ -222,13 +221,17 @@ def _compass_now(
 
 def _corrected(field: Vector, now: Now, present: InForce, fit: MotorFit) -> Vector | None:
     """Undo the correction in force and apply the fitted one."""
-    u_present = now.throttle if present.regressor == THROTTLE else now.current
-    u_new = now.throttle if fit.regressor == THROTTLE else now.current
+    u_present, u_new = _control(present.regressor, now), _control(fit.regressor, now)
     if u_new is None or (u_present is None and present.correction.motor.any()):
         return None
     raw = present.correction.undo(np.array([field]), np.array([u_present or 0.0]))
     x, y, z = fit.correction.apply(raw, np.array([u_new]))[0].tolist()
     return x, y, z
+
+
+def _control(regressor: str | None, now: Now) -> float | None:
+    """What the vehicle says of a control quantity."""
+    return quantity_of(regressor).of(current=now.current, throttle=now.throttle)
 
 
 def _heading_deg(field: Vector, now: Now) -> float | None:
@@ -250,7 +253,8 @@ def warnings(
     """
     autopilot = autopilots.of(vehicle)
     yield from autopilot.warnings(parameters)
-    yield from _on_compasses(now, vehicle, autopilot, streaming_s)
+    yield from autopilot.link_notes(len(vehicle.compasses))
+    yield from _on_compasses(now, vehicle, parameters, streaming_s)
     if streaming_s > 3.0 and now.current is None:
         yield "there is no current sensor: throttle is used, which changes with the battery"
     if (regressor := autopilot.regressor(parameters)) is not None:
@@ -290,8 +294,9 @@ def slow_streams(
 
 
 def _on_compasses(
-    now: Now, vehicle: Vehicle, autopilot: Autopilot, streaming_s: float
+    now: Now, vehicle: Vehicle, parameters: Mapping[str, float], streaming_s: float
 ) -> Iterator[str]:
+    autopilot = autopilots.of(vehicle)
     if streaming_s > 3.0 and not now.fields:
         yield f"no compass reports: {autopilot.no_compass_hint()}"
     elif streaming_s > 3.0 and len(now.fields) < len(vehicle.device_ids):
@@ -299,12 +304,11 @@ def _on_compasses(
         yield f"{_compasses(missing)} of {len(vehicle.device_ids)} does not report"
     if now.compass_trouble:
         yield "the autopilot says that its compass is not healthy"
-    for number, field in sorted(now.fields.items()):
-        strength = math.hypot(*field)
-        if not _PLAUSIBLE[0] < strength < _PLAUSIBLE[1]:
+    for compass in compasses_now(now, vehicle, parameters, Refit()):
+        if not compass.healthy:
             yield (
-                f"compass {number} reads {strength:.0f} mGauss: the earth's field is "
-                "between 220 and 670"
+                f"compass {compass.number} reads {compass.strength:.0f} mGauss: the earth's field "
+                "is between 220 and 670"
             )
 
 

@@ -119,10 +119,11 @@ def make_plan(
     wanted: ParameterSet,
     *,
     any_vehicle: bool = False,
+    everything: bool = False,
     clock: Callable[[], float] = time.monotonic,
     on_progress: Callable[[ReadProgress], None] = _silent,
 ) -> WritePlan:
-    """Read the vehicle's calibration and compare it with what is wanted.
+    """Read the vehicle's calibration and compare it with what is wanted; the options of ``plan``.
 
     Raises
     ------
@@ -136,8 +137,10 @@ def make_plan(
         The vehicle does not answer, or the link is lost.
     """
     connection.discard()
-    current = read_current(connection, vehicle, wanted, clock=clock, on_event=on_progress)
-    return plan(current, wanted, vehicle, any_vehicle=any_vehicle)
+    current = read_current(
+        connection, vehicle, wanted, everything=everything, clock=clock, on_event=on_progress
+    )
+    return plan(current, wanted, vehicle, any_vehicle=any_vehicle, everything=everything)
 
 
 def wait_disarmed(

@@ -23,6 +23,7 @@ from magcomp.model.fit import (
     unpack,
 )
 from magcomp.model.parameters import ParameterSet
+from magcomp.model.quantity import CURRENT, QUANTITIES, THROTTLE, Quantity, quantity_of, unit_of
 from magcomp.model.recording import (
     SPEED_CONTROLLERS,
     Applied,
@@ -39,9 +40,6 @@ from magcomp.model.recording import (
     compasses_of,
 )
 from magcomp.model.samples import (
-    CURRENT,
-    THROTTLE,
-    UNITS,
     Control,
     Correction,
     InForce,
@@ -55,10 +53,10 @@ __all__ = [
     "CURRENT",
     "MOTOR",
     "OFFSET",
+    "QUANTITIES",
     "SOFT_IRON",
     "SPEED_CONTROLLERS",
     "THROTTLE",
-    "UNITS",
     "Analysis",
     "Applied",
     "BoolArray",
@@ -80,6 +78,7 @@ __all__ = [
     "ParameterChange",
     "ParameterHistory",
     "ParameterSet",
+    "Quantity",
     "ReadReport",
     "Readings",
     "Recording",
@@ -89,6 +88,8 @@ __all__ = [
     "Verdict",
     "compasses_of",
     "pack",
+    "quantity_of",
     "symmetric",
+    "unit_of",
     "unpack",
 ]

@@ -12,25 +12,30 @@ from magcomp.model.recording import FloatArray, Vehicle
 from magcomp.model.samples import Correction, Lags
 
 CORRECTION_SIZE = 12
-"""Parameters of a correction: motor x y z, offset x y z, soft iron xx yy zz xy xz yz."""
+"""Parameters of a correction: motor x y z, offset x y z, soft iron xx yy zz xy xz yz.
+
+Where the control quantity has more than one part, the other parts' motor vectors follow.
+"""
 
 MOTOR, OFFSET, SOFT_IRON = slice(0, 3), slice(3, 6), slice(6, 12)
 _ROWS, _COLUMNS = np.array([0, 1, 2, 0, 0, 1]), np.array([0, 1, 2, 1, 2, 2])
 
 
 def pack(correction: Correction) -> FloatArray:
-    """A correction as its 12 parameters."""
+    """A correction of k parts as its 9 + 3 k parameters, 12 for one part."""
+    first, others = correction.motor[:, 0], correction.motor[:, 1:]
     return np.concatenate(
-        [correction.motor, correction.offset, correction.soft_iron[_ROWS, _COLUMNS]]
+        [first, correction.offset, correction.soft_iron[_ROWS, _COLUMNS], others.T.reshape(-1)]
     )
 
 
 def unpack(parameters: FloatArray) -> Correction:
-    """A correction from its 12 parameters."""
+    """A correction from its parameters: the inverse of :func:`pack`."""
+    others = parameters[CORRECTION_SIZE:].reshape(-1, 3)
     return Correction(
         offset=parameters[OFFSET].copy(),
         soft_iron=symmetric(parameters[SOFT_IRON]),
-        motor=parameters[MOTOR].copy(),
+        motor=np.vstack([parameters[MOTOR], others]).T,
     )
 
 
@@ -122,13 +127,13 @@ class MotorFit:
     why
         In words, why this method and these free parameters.
     regressor
-        ``"current"`` or ``"throttle"``.
+        The name of a :class:`Quantity`.
     origin
         In words, what the regressor was made of.
     correction
         What to write.
     covariance
-        Of the 12 parameters of :func:`pack`, shape (12, 12).
+        Of the parameters of :func:`pack`, shape (12, 12) for one part.
     free
         Which groups the data determined: a subset of ``{"motor", "offset", "diagonal",
         "off-diagonal"}``.
@@ -172,7 +177,7 @@ class MotorFit:
     @property
     def interference(self) -> FloatArray:
         """Field the motors add to the corrected field, mGauss per unit, shape (3,)."""
-        return -self.correction.motor
+        return -self.correction.vector
 
     @property
     def interference_std(self) -> FloatArray:

@@ -20,8 +20,11 @@ class ParameterSet:
         Whose parameters these are; None where a file does not say.
     comments
         Lines for people that stand at the head of a file, without comment signs.
+    warnings
+        Sentences on what a file leaves in doubt, without a full stop.
     """
 
     values: Mapping[str, float]
     vehicle: Vehicle | None = None
     comments: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from magcomp.model.recording import BoolArray, FloatArray, IntArray, Series
 
-THROTTLE = "throttle"
-CURRENT = "current"
-UNITS: Mapping[str, str] = {CURRENT: "A", THROTTLE: ""}
-"""Unit of each control quantity; throttle is a fraction 0 … 1."""
-
 
 @dataclass(frozen=True, eq=False)
 class Correction:
     """A complete compass correction: corrected = soft_iron · (raw + offset) + motor · u.
+
+    The control quantity u is one number, such as the battery's current, or has k parts, such as
+    the current of each motor. Wherever u is asked for, its parts may be given, shape (n, k), or
+    their total, shape (n,), which then all parts share alike.
 
     Attributes
     ----------
@@ -26,25 +24,49 @@ class Correction:
     soft_iron
         Symmetric and positive definite, shape (3, 3).
     motor
-        mGauss per unit of the control quantity, shape (3,).
+        mGauss per unit of each part of the control quantity, shape (3, k); one vector, shape (3,),
+        may be given where there is one part.
+
+    Examples
+    --------
+    A current of 10 A that moves the field by −2 mGauss an ampere along x:
+
+    >>> made = Correction(np.zeros(3), np.eye(3), np.array([2.0, 0.0, 0.0]))
+    >>> made.apply(np.array([[180.0, 0.0, 400.0]]), np.array([10.0])).tolist()
+    [[200.0, 0.0, 400.0]]
     """
 
     offset: FloatArray
     soft_iron: FloatArray
     motor: FloatArray
 
+    def __post_init__(self) -> None:
+        if np.ndim(self.motor) == 1:
+            object.__setattr__(self, "motor", np.asarray(self.motor)[:, None])
+
+    @property
+    def vector(self) -> FloatArray:
+        """Its field per unit of the total, mGauss, shared alike by all parts, shape (3,)."""
+        return np.asarray(self.motor[:, 0] if self.motor.shape[1] == 1 else self.motor.mean(axis=1))
+
+    def added(self, u: FloatArray) -> FloatArray:
+        """What the motor correction adds, mGauss, shape (n, 3)."""
+        if np.ndim(u) == 1:
+            return np.multiply.outer(u, self.vector)
+        return np.asarray(u @ self.motor.T)
+
     def apply(self, raw: FloatArray, u: FloatArray) -> FloatArray:
         """Corrected field, mGauss, shape (n, 3): docs/method.md, Equation 6."""
-        return (raw + self.offset) @ self.soft_iron.T + np.multiply.outer(u, self.motor)
+        return (raw + self.offset) @ self.soft_iron.T + self.added(u)
 
     def undo(self, corrected: FloatArray, u: FloatArray) -> FloatArray:
         """Sensor field, mGauss, shape (n, 3): the inverse of :meth:`apply`."""
-        linear = corrected - np.multiply.outer(u, self.motor)
+        linear = corrected - self.added(u)
         return np.asarray(np.linalg.solve(self.soft_iron, linear.T).T - self.offset)
 
     def centre(self, u: float) -> FloatArray:
         """Centre of the raw ellipsoid at control quantity ``u``, mGauss, shape (3,)."""
-        return -self.offset - np.linalg.solve(self.soft_iron, self.motor) * u
+        return -self.offset - np.linalg.solve(self.soft_iron, self.vector) * u
 
 
 @dataclass(frozen=True)
@@ -70,9 +92,9 @@ class Control:
     Attributes
     ----------
     kind
-        ``"current"`` or ``"throttle"``.
+        The name of a :class:`Quantity`.
     series
-        The quantity in the unit of :data:`UNITS`.
+        The quantity, shape (n,), or its parts, shape (n, k), in the quantity's unit.
     origin
         In words: which messages it was made of.
     """
@@ -80,6 +102,18 @@ class Control:
     kind: str
     series: Series
     origin: str
+
+    @property
+    def parts(self) -> int:
+        """How many parts it has."""
+        return 1 if self.series.value.ndim == 1 else self.series.value.shape[1]
+
+    @property
+    def total(self) -> Series:
+        """The sum of the parts, shape (n,)."""
+        if self.series.value.ndim == 1:
+            return self.series
+        return Series(self.series.time, self.series.value.sum(axis=1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,9 +215,9 @@ class Samples:
     down_rate
         Its change per second, shape (n, 3).
     u
-        Control quantity, shape (n,).
+        Parts of the control quantity, shape (n, k).
     u_rate
-        Its change per second, shape (n,).
+        Their change per second, shape (n, k).
     """
 
     compass: int
@@ -200,6 +234,11 @@ class Samples:
 
     def __len__(self) -> int:
         return len(self.time)
+
+    @property
+    def total(self) -> FloatArray:
+        """The control quantity as one number, the sum of its parts, shape (n,)."""
+        return np.asarray(self.u[:, 0] if self.u.shape[1] == 1 else self.u.sum(axis=1))
 
     def where(self, keep: BoolArray) -> Samples:
         """The rows for which ``keep`` is true."""

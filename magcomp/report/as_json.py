@@ -16,7 +16,6 @@ import numpy as np
 from magcomp import __version__
 from magcomp.judge.judge import error_at
 from magcomp.model import (
-    UNITS,
     Analysis,
     CompassResult,
     Coverage,
@@ -26,6 +25,7 @@ from magcomp.model import (
     Recording,
     Vehicle,
     Verdict,
+    quantity_of,
 )
 
 
@@ -59,7 +59,7 @@ def check_object(
             {
                 "compass": compass,
                 "regressor": regressor,
-                "unit": UNITS[regressor],
+                "unit": quantity_of(regressor).unit,
                 "heading_error_deg": [
                     {"u": row.u, "in_force": row.before, "p95": row.p95}
                     for row in verdict.heading_error
@@ -112,7 +112,7 @@ def _compass(result: CompassResult) -> dict[str, Any]:
         "method": fit.method,
         "why": fit.why,
         "regressor": fit.regressor,
-        "unit": UNITS[fit.regressor],
+        "unit": quantity_of(fit.regressor).unit,
         "origin": fit.origin,
         "interference_mgauss": fit.interference,
         "std_mgauss": fit.interference_std,
@@ -133,7 +133,7 @@ def _compass(result: CompassResult) -> dict[str, Any]:
             {"u": row.u, "before": row.before, "after": row.after, "p95": row.p95}
             for row in verdict.heading_error
         ],
-        "quoted": _quoted(verdict),
+        "quoted": quoted(verdict),
         "coverage": _coverage(verdict.coverage),
         "free": sorted(fit.free),
         "earth_mgauss": {"strength": fit.strength, "vertical": fit.vertical},
@@ -146,7 +146,7 @@ def _compass(result: CompassResult) -> dict[str, Any]:
     }
 
 
-def _quoted(verdict: Verdict) -> dict[str, float | bool]:
+def quoted(verdict: Verdict) -> dict[str, float | bool]:
     """The one row of the heading errors that every sentence and card quotes.
 
     It is the hover's, or the highest control quantity's where only there something is gained.

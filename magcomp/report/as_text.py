@@ -25,6 +25,7 @@ from magcomp.model import (
     Verdict,
 )
 from magcomp.report import as_json, plain, tables, words
+from magcomp.report.ascii import in_words
 from magcomp.report.bars import BEFORE_AFTER, Row, bars
 from magcomp.report.look import Look
 from magcomp.report.roles import roles
@@ -132,7 +133,7 @@ def truth_text(source: str, rows: Sequence[tuple[float, float, float]], look: Lo
                 (0, 1),
             ),
             Text(),
-            *bars("heading error", ("before", "after"), drawn),
+            bars("heading error", ("before", "after"), drawn),
             Text(),
             _last("Now a log of your own:", "magcomp fit FLIGHT.tlog -o compass.param"),
         ],
@@ -155,7 +156,8 @@ def render(parts: Iterable[RenderableType], look: Look) -> str:
     )
     console.print(Group(*parts))
     # Rich fills lines with blanks, which only make a copied text untidy.
-    return "".join(f"{line.rstrip()}\n" for line in page.getvalue().splitlines())
+    text = "".join(f"{line.rstrip()}\n" for line in page.getvalue().splitlines())
+    return in_words(text) if look.ascii_only else text
 
 
 def heading(source: str, vehicle: Vehicle, duration_s: float) -> Iterator[RenderableType]:
@@ -181,7 +183,7 @@ def _whose(source: str, vehicle: Vehicle, duration_s: float) -> Iterator[Rendera
     yield Text(f" {words.duration(duration_s)} of {words.vehicle(vehicle)}")
     if vehicle.device_ids:
         ids = ", ".join(map(str, vehicle.device_ids))
-        yield Text(f" compass device ids {ids}", style="dim")
+        yield Padding(Text(f"compass device ids {ids}", style="dim"), (0, 0, 0, 1))
 
 
 @dataclass(frozen=True)
@@ -221,16 +223,17 @@ def _findings(
     for group in _alike(results):
         first = group[0]
         yield Text()
-        yield _title(first.verdict.grade, [result.compass for result in group])
+        title = _title(first.verdict.grade, [result.compass for result in group])
+        yield Padding(title, (0, 0, 0, 1))
         for reason in first.reasons:
             yield Padding(Text(words.sentence(reason)), (0, 1, 0, 3))
         yield Text()
-        yield from bars("heading error", columns, list(_rows(first)), styles)
+        yield bars("heading error", columns, list(_rows(first)), styles)
         covered, table = first.verdict.coverage, first.verdict.heading_error
         low, high = (words.quantity(u, first.regressor) for u in (covered.u_low, covered.u_high))
         if not all(words.is_flown(row.u, covered.u_low, covered.u_high) for row in table):
             note = f"in brackets: reckoned, not flown; the log covers {low} to {high}"
-            yield Text(f"      {note}", style="dim")
+            yield Padding(Text(note, style="dim"), (0, 0, 0, 6))
 
 
 def _rows(finding: _Finding) -> Iterator[Row]:
@@ -262,14 +265,14 @@ def _roles(document: Mapping[str, Any]) -> Iterator[RenderableType]:
         return
     yield Text()
     for role in found:
-        line = Text(f" compass {role.compass}", style="bold")
+        line = Text(f"compass {role.compass}", style="bold")
         use = f" ({role.use})" if role.use else ""
         line.append(f"{use}: {role.action}", style="not bold")
-        yield line
+        yield Padding(line, (0, 0, 0, 1))
 
 
 def _title(grade: Grade, numbers: Sequence[int]) -> Text:
-    title = Text(" ")
+    title = Text()
     title.append(f"{_GRADE_SIGN[grade]} {grade.value.upper()}", style=GRADE_STYLE[grade])
     title.append(f"  {words.compasses(numbers)}", style="bold")
     if len(numbers) > 1:
@@ -346,9 +349,9 @@ def _parameters(
 
 def _levels(analysis: Analysis) -> Iterator[RenderableType]:
     for result in analysis.compasses:
-        title = f" compass {result.fit.compass}: centre of the raw readings, mGauss"
+        title = f"compass {result.fit.compass}: centre of the raw readings, mGauss"
         yield Text()
-        yield Text(title, style="bold")
+        yield Padding(Text(title, style="bold"), (0, 0, 0, 1))
         yield tables.levels(result)
 
 

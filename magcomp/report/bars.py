@@ -7,9 +7,13 @@ from dataclasses import dataclass
 
 from rich.text import Text
 
+from magcomp.report.by_width import ByWidth
+
 _EIGHTHS = ("", "▏", "▎", "▍", "▌", "▋", "▊", "▉")
 BEFORE_AFTER = ("red", "green")
-_WIDTH = 22
+_WIDEST = 22
+_AROUND = 34
+"""Columns of a line that are no bars."""
 
 
 @dataclass(frozen=True)
@@ -31,19 +35,31 @@ def bars(
     columns: tuple[str, str],
     rows: Sequence[Row],
     styles: tuple[str, str] = BEFORE_AFTER,
-) -> Iterator[Text]:
+) -> ByWidth:
     """A small plot: a line a control quantity, two bars a line, all to one scale."""
+    return ByWidth(lambda width: lines(title, columns, rows, styles, width))
+
+
+def lines(
+    title: str,
+    columns: tuple[str, str],
+    rows: Sequence[Row],
+    styles: tuple[str, str],
+    width: int,
+) -> Iterator[Text]:
+    """The plot's lines, none longer than ``width`` columns, from 60."""
+    length = min(_WIDEST, (width - _AROUND) // 2)
     largest = max((value for row in rows for value in row.values), default=0.0)
-    head = f"      {title:<16}"
-    yield Text(f"{head}{columns[0]:<{_WIDTH + 10}}{columns[1]}", style="dim")
+    head = f"      {title:<16}{columns[0]}"
+    second = min(len(head) - len(columns[0]) + length + 10, width - len(columns[1]))
+    yield Text(f"{head:<{second}}{columns[1]}", style="dim")
     for row in rows:
         line = Text(f"{row.label:>12}", style="bold" if row.is_marked else "dim")
         for index, (value, style) in enumerate(zip(row.values, styles, strict=True)):
             sign = "≤" if row.is_bound and index == 0 else " "
             line.append(f"{sign + f'{value:.1f}':>8}°  ", style="not bold not dim")
-            line.append(
-                f"{bar(value, largest, _WIDTH):<{_WIDTH}}", style=f"not bold not dim {style}"
-            )
+            drawn = bar(value, largest, length)
+            line.append(drawn if index else f"{drawn:<{length}}", style=f"not bold not dim {style}")
         yield line
 
 

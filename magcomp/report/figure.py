@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from magcomp.model import CURRENT
+from magcomp.model import quantity_of as known_quantity
 from magcomp.report import words
 
 BEFORE, AFTER, INK, MUTED, GRID, SCALE = "@before", "@after", "@ink", "@muted", "@grid", "@scale"
@@ -44,6 +44,8 @@ class Figure:
         Pixels.
     wide
         Whether it deserves the whole width of the page.
+    play
+        What moves in it when the reader moves the control quantity, as the page's script takes it.
     """
 
     name: str
@@ -53,6 +55,7 @@ class Figure:
     layout: Mapping[str, Any]
     height: int = 320
     wide: bool = False
+    play: Mapping[str, Any] | None = None
 
 
 @dataclass(frozen=True)
@@ -80,9 +83,8 @@ class Quantity:
 
 def quantity_of(regressor: str) -> Quantity:
     """The control quantity of a fit."""
-    if regressor == CURRENT:
-        return Quantity("current", "A", 1.0)
-    return Quantity("throttle", "%", 100.0)
+    known = known_quantity(regressor)
+    return Quantity(known.name, known.shown_unit, known.scale)
 
 
 def shade(share: float) -> str:

@@ -15,7 +15,10 @@ class Look:
         Width.
     colour
         Whether a terminal's colours may be used.
+    ascii_only
+        Whether it takes nothing but ASCII.
     """
 
     columns: int = 80
     colour: bool = False
+    ascii_only: bool = False

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from magcomp.model import CURRENT, Grade, Verdict
+from magcomp.model import Grade, Verdict, quantity_of
 from magcomp.report import words
 
 Document = Mapping[str, Any]
@@ -93,9 +93,7 @@ def _before(row: Any) -> float:
 
 def _where(document: Document, compass: Mapping[str, Any]) -> str:
     row = compass["quoted"]
-    u = words.quantity(row["u"], compass["regressor"])
-    if compass["regressor"] != CURRENT:
-        u = f"{u} throttle"
+    u = quantity_of(compass["regressor"]).in_sentence(row["u"])
     flies = compass["method"] == "flight" and document["vehicle"]["kind"] in _HOVERING
     return f"at hover ({u})" if row["hover"] and flies else f"at {u}"
 

@@ -3,38 +3,65 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
+from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
 from magcomp import autopilots
 from magcomp.autopilots import Kind
-from magcomp.model import CURRENT, CompassResult, MotorFit, Verdict
+from magcomp.model import CompassResult, MotorFit, Verdict, quantity_of
 from magcomp.report import words
+from magcomp.report.by_width import ByWidth
 
 _DECIMALS = {Kind.OFFSET: 2, Kind.DIAGONAL: 4, Kind.OFF_DIAGONAL: 4}
 
 
+_NAMES, _COLUMN = 25, 17
+"""Columns of the screen that the names of rows take, and a compass."""
+_VECTORS_WIDTH = 74
+"""Columns that a row a vector takes."""
+
+
 class _Columns:
-    """A table with a column a compass, in sections."""
+    """A table with a column a compass, in sections; on a narrow screen several, a few each."""
 
     def __init__(self, compasses: Sequence[int]) -> None:
-        self.table = Table(box=None, pad_edge=False, padding=(0, 1), show_edge=False)
-        self.table.add_column()
-        for compass in compasses:
-            title = Text(f"compass {compass}", style="bold")
-            self.table.add_column(title, justify="right", min_width=15)
+        self._compasses = compasses
+        self._rows: list[tuple[Text, list[str]]] = []
 
     def section(self, title: str) -> None:
-        self.table.add_row(Text(f" {title}"))
+        self._rows.append((Text(f" {title}"), []))
 
     def row(self, name: str, cells: Iterable[str]) -> None:
-        self.table.add_row(Text(f"   {name}", style="dim"), *map(Text, cells))
+        self._rows.append((Text(f"   {name}", style="dim"), list(cells)))
+
+    def tables(self, width: int) -> Iterator[RenderableType]:
+        count = len(self._compasses)
+        each = max((width - _NAMES) // _COLUMN, 1)
+        for first in range(0, count, each):
+            if first:
+                yield Text()
+            yield self._table(range(first, min(first + each, count)))
+
+    def _table(self, which: range) -> Table:
+        table = _plain_table()
+        table.add_column()
+        for index in which:
+            title = Text(f"compass {self._compasses[index]}", style="bold")
+            table.add_column(title, justify="right", min_width=_COLUMN - 2)
+        for name, cells in self._rows:
+            table.add_row(name, *(Text(cells[index]) for index in which if cells))
+        return table
 
 
-def evidence(results: Sequence[CompassResult], *, verbose: bool = True) -> Table:
+def _plain_table() -> Table:
+    return Table(box=None, pad_edge=False, padding=(0, 1), show_edge=False)
+
+
+def evidence(results: Sequence[CompassResult], *, verbose: bool = True) -> ByWidth:
     """Interference and coverage; where verbose, unexplained field, lags and line too."""
     fits = [result.fit for result in results]
     verdicts = [result.verdict for result in results]
@@ -47,7 +74,7 @@ def evidence(results: Sequence[CompassResult], *, verbose: bool = True) -> Table
     if verbose:
         _statistics(columns, fits, verdicts)
     _coverage(columns, verdicts, regressor)
-    return columns.table
+    return ByWidth(columns.tables)
 
 
 def _statistics(columns: _Columns, fits: Sequence[MotorFit], verdicts: Sequence[Verdict]) -> None:
@@ -68,14 +95,14 @@ def _statistics(columns: _Columns, fits: Sequence[MotorFit], verdicts: Sequence[
     columns.row("straight to", map(_line, fits))
 
 
-def check(verdicts: Mapping[int, Verdict], regressor: str) -> Table:
+def check(verdicts: Mapping[int, Verdict], regressor: str) -> ByWidth:
     """What a check of the calibration in force rests on."""
     columns = _Columns(sorted(verdicts))
     ordered = [verdicts[compass] for compass in sorted(verdicts)]
     columns.section("unexplained field, mGauss")
     columns.row("in force", (f"{verdict.residual.before:.1f}" for verdict in ordered))
     _coverage(columns, ordered, regressor)
-    return columns.table
+    return ByWidth(columns.tables)
 
 
 def _coverage(columns: _Columns, verdicts: Sequence[Verdict], regressor: str) -> None:
@@ -101,23 +128,35 @@ def _line(fit: MotorFit) -> str:
 
 def parameters(
     values: Mapping[str, float], present: Mapping[str, float], *, verbose: bool
-) -> tuple[Table, list[str]]:
+) -> tuple[ByWidth, list[str]]:
     """What would be written: old → new, a row a vector; and the vectors that stay as they are.
 
-    Where verbose, those are in the table too.
+    Where verbose, those are in the table too. On a narrow screen each parameter has a row.
     """
-    table = Table(box=None, pad_edge=False, padding=(0, 1), show_edge=False)
-    table.add_column(Text(" parameter", style="dim"))
-    for axis in "XYZ":
-        table.add_column(Text(f"_{axis}", style="dim"), justify="right", min_width=17)
     unchanged = []
+    shown: dict[str, dict[str, Text]] = {}
     for name, members in _vectors(values).items():
         if not verbose and all(_same(values[m], present.get(m, math.nan)) for m in members):
             unchanged.append(name)
             continue
-        cells = [_change(m, values[m], present.get(m, math.nan)) for m in members]
-        table.add_row(Text(f" {name}"), *cells)
-    return table, unchanged
+        shown[name] = {m: _change(m, values[m], present.get(m, math.nan)) for m in members}
+    return ByWidth(lambda width: [_changes(shown, width)]), unchanged
+
+
+def _changes(shown: Mapping[str, Mapping[str, Text]], width: int) -> Table:
+    table = _plain_table()
+    table.add_column(Text(" parameter", style="dim"))
+    if width < _VECTORS_WIDTH:
+        table.add_column(justify="right")
+        for members in shown.values():
+            for name, change in members.items():
+                table.add_row(Text(f" {name}"), change)
+        return table
+    for axis in "XYZ":
+        table.add_column(Text(f"_{axis}", style="dim"), justify="right", min_width=17)
+    for vector, members in shown.items():
+        table.add_row(Text(f" {vector}"), *members.values())
+    return table
 
 
 def _vectors(values: Mapping[str, float]) -> dict[str, list[str]]:
@@ -148,19 +187,25 @@ def _change(name: str, new: float, old: float) -> Text:
     return text
 
 
-def levels(result: CompassResult) -> Table:
+def levels(result: CompassResult) -> ByWidth:
     """Centre of the ellipsoid at each level of the control quantity: docs/method.md, Fig. 4."""
+    return ByWidth(lambda width: [_levels(result, is_wide=width >= _VECTORS_WIDTH)])
+
+
+def _levels(result: CompassResult, *, is_wide: bool) -> Table:
     fit = result.fit
-    table = Table(box=None, pad_edge=False, padding=(0, 1), show_edge=False)
-    table.add_column(Text(f"   {fit.regressor}", style="dim"), justify="right", min_width=10)
+    table = _plain_table()
+    table.add_column(Text(f"   {fit.regressor}", style="dim"), justify="right")
     for axis in words.AXES:
-        table.add_column(Text(axis, style="dim"), justify="right", min_width=15)
-    table.add_column(Text("readings", style="dim"), justify="right", min_width=9)
+        table.add_column(Text(axis, style="dim"), justify="right", min_width=15 if is_wide else 0)
+    if is_wide:
+        table.add_column(Text("readings", style="dim"), justify="right", min_width=9)
     for level in fit.levels:
         std = np.sqrt(np.diag(level.covariance))
-        u = f"{level.u:.1f} A" if fit.regressor == CURRENT else f"{100 * level.u:.1f} %"
+        u = quantity_of(fit.regressor).precise(level.u)
         centre = [
             words.with_std(float(c), float(s)) for c, s in zip(level.centre, std, strict=True)
         ]
-        table.add_row(Text(u, style="dim"), *map(Text, centre), Text(str(level.count)))
+        count = [Text(str(level.count))] if is_wide else []
+        table.add_row(Text(u, style="dim"), *map(Text, centre), *count)
     return table

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from magcomp import autopilots
-from magcomp.model import CURRENT, Vehicle
+from magcomp.model import Vehicle, quantity_of
 
 _MOST_DECIMALS = 3
 
@@ -19,7 +19,7 @@ _NEARLY = 1.05
 
 def quantity(u: float, regressor: str) -> str:
     """A control quantity: ``20 A`` or ``40 %``."""
-    return f"{u:.0f} A" if regressor == CURRENT else f"{100 * u:.0f} %"
+    return quantity_of(regressor).text(u)
 
 
 def is_flown(u: float, low: float, high: float) -> bool:
@@ -41,7 +41,7 @@ def degrees(value: float) -> str:
 
 def interference_title(regressor: str) -> str:
     """What an interference vector is, with its unit."""
-    return "motors add, mGauss per A" if regressor == CURRENT else "motors add at full, mGauss"
+    return quantity_of(regressor).added_title
 
 
 def with_std(value: float, std: float) -> str:

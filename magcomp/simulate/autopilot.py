@@ -8,6 +8,7 @@ The rules, as in ArduCopter 4.6 (docs/autopilots.md, ArduPilot: parameters):
 - The parameter list comes at its own pace; asking again begins it again.
 - At most 20 requests to read one parameter wait; more are dropped.
 - A command that is not known is acknowledged as unsupported.
+- A motor test is refused in the air, and looks armed while it runs (motor_test.py).
 - With SYSID_ENFORCE only the ground station whose system is SYSID_MYGCS is listened to.
 """
 
@@ -21,22 +22,23 @@ import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from magcomp.simulate.habits import BOARD_VERSION, Habits
+from magcomp.simulate.motor_test import MotorTest
 from magcomp.simulate.parameters import ParameterStore, is_read_only
-from magcomp.simulate.streams import GROUPS, TELEMETRY, Schedule
+from magcomp.simulate.streams import GROUPS, TELEMETRY
+from magcomp.simulate.talker import Talker
 
 FIRMWARE = "4.6.3"
 GIT_HASH = "92b0cd78"
 BOARD_ID = "magcomp simulated vehicle"
 
 _NO_INDEX = 65535
-_FORCE = 21196.0
 _LIST_PER_10_MS = 8
 _READS_PER_10_MS = 5
 _READS_HELD = 20
 _MODES = {"stabilize": 0, "auto": 3, "guided": 4, "loiter": 5}
 
 
-class Autopilot:
+class Autopilot(Talker):
     """Everything ArduCopter says and does that has nothing to do with physics.
 
     Parameters
@@ -60,25 +62,17 @@ class Autopilot:
         answers_errors: bool = False,
         habits: Habits | None = None,
     ) -> None:
+        super().__init__(TELEMETRY, system, component, habits)
         self.store = store
-        self._habits = habits or Habits()
         self._now_s = 0.0
         self._answers_errors = answers_errors
-        self.system = system
-        self.component = component
         self.mode = _MODES["stabilize"]
-        self.flying = False
-        self.reboot_wanted = False
         self.start_up()
 
     def start_up(self) -> None:
         """Forget what a reboot forgets; announce the firmware."""
-        self.armed = False
-        self.flying = False
-        self.reboot_wanted = False
-        self.schedule = Schedule()
-        self.once: deque[int] = deque()
-        self.outgoing: deque[Any] = deque()
+        self.forget()
+        self.motor_test = MotorTest(self.store["MOT_PWM_MIN"], self.store["MOT_PWM_MAX"])
         self._list: deque[tuple[int, str]] = deque()
         self._reads: deque[Any] = deque()
         self.store.sort_compasses()
@@ -97,6 +91,10 @@ class Autopilot:
         """Store and send the next few parameters; called every 10 ms, in seconds since power-up."""
         self._now_s = now_s
         self.store.settle(now_s)
+        if self.motor_test.running:
+            self.motor_test.advance(now_s)
+            if not self.motor_test.running:
+                self._end_motor_test()
         for _ in range(min(_READS_PER_10_MS, len(self._reads))):
             self._answer_read(self._reads.popleft())
         names = len(self.store.listed) if self._list else 0
@@ -106,7 +104,7 @@ class Autopilot:
 
     def arm(self, *, force: bool = False) -> bool:
         """Arm, unless a check forbids it; whether the motors are armed now."""
-        if not self.armed:
+        if not self.armed and not self.motor_test.running:
             reason = None if force else self._arming_objection()
             if reason is not None:
                 self.say(f"Arm: {reason}", mavlink.MAV_SEVERITY_CRITICAL)
@@ -117,6 +115,8 @@ class Autopilot:
 
     def disarm(self, *, force: bool = False) -> bool:
         """Disarm, unless in the air; whether the motors are disarmed now."""
+        if self.motor_test.running:
+            self._end_motor_test()
         if self.armed:
             if self.flying and not force:
                 return False
@@ -129,13 +129,7 @@ class Autopilot:
         stranger = message.get_srcSystem() != self.store["SYSID_MYGCS"]
         if stranger and self.store["SYSID_ENFORCE"]:
             return
-        for_system = getattr(message, "target_system", 0)
-        for_component = getattr(message, "target_component", 0)
-        if for_system not in (0, self.system) or for_component not in (0, self.component):
-            return
-        handler = self._handlers.get(message.get_type())
-        if handler is not None:
-            handler(self, message, now_ms)
+        super().handle(message, now_ms)
 
     def heartbeat(self) -> Any:
         """HEARTBEAT."""
@@ -143,14 +137,15 @@ class Autopilot:
         mode |= mavlink.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
         if self.mode in (_MODES["auto"], _MODES["guided"]):
             mode |= mavlink.MAV_MODE_FLAG_GUIDED_ENABLED
-        if self.armed:
+        armed = self.armed or self.motor_test.running
+        if armed:
             mode |= mavlink.MAV_MODE_FLAG_SAFETY_ARMED
         return mavlink.MAVLink_heartbeat_message(
             type=mavlink.MAV_TYPE_QUADROTOR,
             autopilot=mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA,
             base_mode=mode,
             custom_mode=self.mode,
-            system_status=mavlink.MAV_STATE_ACTIVE if self.armed else mavlink.MAV_STATE_STANDBY,
+            system_status=mavlink.MAV_STATE_ACTIVE if armed else mavlink.MAV_STATE_STANDBY,
             mavlink_version=3,
         )
 
@@ -175,20 +170,8 @@ class Autopilot:
             vendor_id=0,
             product_id=0,
             uid=0,
-            uid2=tuple((self._habits.uid or b"").ljust(18, b"\0")),
+            uid2=self.uid2(),
         )
-
-    def companions(self) -> list[tuple[int, Any]]:
-        """A heartbeat of everybody else in this system, with the component that sends it."""
-        return [
-            (
-                other.component,
-                mavlink.MAVLink_heartbeat_message(
-                    other.mav_type, other.autopilot, 0, 0, mavlink.MAV_STATE_ACTIVE, 3
-                ),
-            )
-            for other in self._habits.companions
-        ]
 
     def _arming_objection(self) -> str | None:
         most = self.store["COMPASS_OFFS_MAX"]
@@ -207,7 +190,7 @@ class Autopilot:
         self.outgoing.append(
             mavlink.MAVLink_param_value_message(
                 param_id=name.encode("ascii"),
-                param_value=np.nan if name in self._habits.not_numbers else self.store[name],
+                param_value=np.nan if name in self.habits.not_numbers else self.store[name],
                 param_type=self.store.type_of(name),
                 param_count=len(self.store.listed) if count is None else count,
                 param_index=index,
@@ -237,14 +220,14 @@ class Autopilot:
             self._object(message, "DOES_NOT_EXIST")
         elif not np.isfinite(value):
             self._object(message, "VALUE_OUT_OF_RANGE")
-        elif name in self._habits.ignored:
+        elif name in self.habits.ignored:
             return
-        elif is_read_only(name) or name in self._habits.denied:
+        elif is_read_only(name) or name in self.habits.denied:
             self.say(f"Param write denied ({name})", mavlink.MAV_SEVERITY_WARNING)
             self._object(message, "READ_ONLY")
             self._send_parameter(name, _NO_INDEX)
         else:
-            low, high = self._habits.clamped.get(name, (-np.inf, np.inf))
+            low, high = self.habits.clamped.get(name, (-np.inf, np.inf))
             self.store.write(name, min(max(value, low), high), self._now_s)
             for echoed in self.store.echoed(name):
                 self._send_parameter(echoed, _NO_INDEX)
@@ -252,25 +235,12 @@ class Autopilot:
     def _object(self, message: Any, error: str) -> None:
         """PARAM_ERROR, where the firmware has it."""
         if self._answers_errors:
-            self.outgoing.append(
-                mavlink.MAVLink_param_error_message(
-                    target_system=message.get_srcSystem(),
-                    target_component=message.get_srcComponent(),
-                    param_id=message.param_id.encode("ascii", "replace"),
-                    param_index=getattr(message, "param_index", -1),
-                    error=getattr(mavlink, f"MAV_PARAM_ERROR_{error}"),
-                )
-            )
+            self.object_to(message, error)
 
     def _on_data_stream(self, message: Any, now_ms: int) -> None:
         rate = message.req_message_rate if message.start_stop else 0
         for wanted in GROUPS.get(message.req_stream_id, ()):
             self.schedule.set(wanted, 1e6 / rate if rate else 0, now_ms)
-
-    def _on_timesync(self, message: Any, now_ms: int) -> None:
-        if message.tc1 == 0:
-            answer = mavlink.MAVLink_timesync_message(tc1=now_ms * 1_000_000 + 1, ts1=message.ts1)
-            self.outgoing.append(answer)
 
     def _on_version_request(self, message: Any, now_ms: int) -> None:  # noqa: ARG002
         self.outgoing.append(self.version())
@@ -284,14 +254,7 @@ class Autopilot:
         if command is not None:
             result = command(self, message, now_ms)
         # The acknowledgement goes before whatever the command has asked for.
-        self.outgoing.append(
-            mavlink.MAVLink_command_ack_message(
-                command=message.command,
-                result=result,
-                target_system=message.get_srcSystem(),
-                target_component=message.get_srcComponent(),
-            )
-        )
+        self.acknowledge(message, result)
 
     def _set_interval(self, message: Any, now_ms: int) -> int:
         wanted = int(message.param1)
@@ -320,29 +283,38 @@ class Autopilot:
         self.once.append(mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
         return int(mavlink.MAV_RESULT_ACCEPTED)
 
-    def _arm_disarm(self, message: Any, now_ms: int) -> int:  # noqa: ARG002
-        force = message.param2 == _FORCE
-        if message.param1 not in (0.0, 1.0):
-            return int(mavlink.MAV_RESULT_UNSUPPORTED)
-        done = self.arm(force=force) if message.param1 else self.disarm(force=force)
-        return int(mavlink.MAV_RESULT_ACCEPTED if done else mavlink.MAV_RESULT_FAILED)
-
     def _reboot(self, message: Any, now_ms: int) -> int:  # noqa: ARG002
-        if message.param1 != 1.0 or self.armed:
+        if message.param1 != 1.0 or self.armed or self.motor_test.running:
             return int(mavlink.MAV_RESULT_FAILED)
         self.reboot_wanted = True
         return int(mavlink.MAV_RESULT_ACCEPTED)
+
+    def _test_motor(self, message: Any, now_ms: int) -> int:  # noqa: ARG002
+        if not self.motor_test.running:
+            if self.flying:
+                self.say("Motor Test: vehicle not landed", mavlink.MAV_SEVERITY_CRITICAL)
+                return int(mavlink.MAV_RESULT_FAILED)
+            self.say("starting motor test")
+        count = message.param5 if message.get_type() == "COMMAND_LONG" else message.x
+        values = (message.param1, message.param2, message.param3, message.param4, count)
+        self.motor_test.command(values, self._now_s)
+        return int(mavlink.MAV_RESULT_ACCEPTED)
+
+    def _end_motor_test(self) -> None:
+        self.say("finished motor test")
+        self.motor_test.stop()
+        self.armed = False
 
     def _set_mode(self, message: Any, now_ms: int) -> int:  # noqa: ARG002
         self.mode = int(message.param2)
         return int(mavlink.MAV_RESULT_ACCEPTED)
 
-    _handlers: ClassVar[Mapping[str, Callable[[Autopilot, Any, int], None]]] = {
+    handlers: ClassVar[Mapping[str, Callable[[Autopilot, Any, int], None]]] = {
         "PARAM_REQUEST_LIST": _on_list,
         "PARAM_REQUEST_READ": _on_read,
         "PARAM_SET": _on_set,
         "REQUEST_DATA_STREAM": _on_data_stream,
-        "TIMESYNC": _on_timesync,
+        "TIMESYNC": Talker.on_timesync,
         "AUTOPILOT_VERSION_REQUEST": _on_version_request,
         "SET_MODE": _on_mode,
         "COMMAND_LONG": _on_command,
@@ -354,7 +326,8 @@ class Autopilot:
         mavlink.MAV_CMD_GET_MESSAGE_INTERVAL: _get_interval,
         mavlink.MAV_CMD_REQUEST_MESSAGE: _request_message,
         mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: _request_capabilities,
-        mavlink.MAV_CMD_COMPONENT_ARM_DISARM: _arm_disarm,
+        mavlink.MAV_CMD_COMPONENT_ARM_DISARM: Talker.arm_or_disarm,
         mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: _reboot,
         mavlink.MAV_CMD_DO_SET_MODE: _set_mode,
+        mavlink.MAV_CMD_DO_MOTOR_TEST: _test_motor,
     }

@@ -26,6 +26,20 @@ DEFAULT_RATES: Mapping[int, float] = {
 }
 """Hertz at which the recordings in sitl_fixtures/ were made."""
 
+PX4_RATES: Mapping[int, float] = {
+    mavlink.MAVLINK_MSG_ID_SCALED_IMU: 15.0,
+    mavlink.MAVLINK_MSG_ID_SCALED_IMU2: 15.0,
+    mavlink.MAVLINK_MSG_ID_SCALED_IMU3: 15.0,
+    mavlink.MAVLINK_MSG_ID_HIGHRES_IMU: 15.0,
+    mavlink.MAVLINK_MSG_ID_ATTITUDE: 25.0,
+    mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: 10.0,
+    mavlink.MAVLINK_MSG_ID_VFR_HUD: 10.0,
+    mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: 10.0,
+    mavlink.MAVLINK_MSG_ID_ACTUATOR_OUTPUT_STATUS: 5.0,
+    mavlink.MAVLINK_MSG_ID_SYS_STATUS: 2.0,
+}
+"""Hertz that a PX4 was asked for when its telemetry was recorded; it sends the rest unasked."""
+
 
 class Asker:
     """Makes the frames a ground station sends.

@@ -60,13 +60,16 @@ class Habits:
     ignored
         Names that take no write, and say nothing.
     denied
-        Names whose write is denied in words.
+        Names whose write is denied: in words by ArduPilot, by PX4 in silence.
     not_numbers
         Names that are always reported as NaN.
     storage_s
-        Seconds within which a write reaches the memory that survives a reboot, in any order.
+        Seconds within which a write reaches the memory that survives a reboot, in any order. PX4
+        has a pace of its own.
     companions
         Who else speaks in the vehicle's system.
+    no_current_sensor
+        PX4 only: its battery reports −1 A, and that is what COMP is multiplied by.
     """
 
     uid: bytes | None = None
@@ -76,6 +79,7 @@ class Habits:
     not_numbers: frozenset[str] = frozenset()
     storage_s: float = 0.0
     companions: tuple[Companion, ...] = ()
+    no_current_sensor: bool = False
 
 
 def own_number(seed: int) -> bytes:

@@ -7,6 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from magcomp.autopilots.terms import ThrustCurve
+
 FloatArray = NDArray[np.float64]
 
 _LONGEST_US = 2500.0
@@ -58,6 +60,29 @@ def motor_outputs(
     actuator = least + (most - least) * np.clip(ratio / volts, 0.0, 1.0)
     actuator = np.where(thrust > 0.0, actuator, parameters["MOT_SPIN_ARM"])
     return np.asarray(np.clip(low + (high - low) * actuator, 0.0, _LONGEST_US))
+
+
+def motor_thrust(
+    outputs: FloatArray, *, altitude_m: float, parameters: Mapping[str, float]
+) -> FloatArray:
+    """Thrust that motors give which are driven with ``outputs``, 0 … 1, same shape.
+
+    Undoes :func:`motor_outputs`, without its scaling by the battery's voltage.
+
+    Parameters
+    ----------
+    outputs
+        Microseconds.
+    altitude_m, parameters
+        As there.
+    """
+    low, high = parameters["MOT_PWM_MIN"], parameters["MOT_PWM_MAX"]
+    curve = ThrustCurve(
+        min(max(parameters["MOT_THST_EXPO"], -1.0), 1.0),
+        parameters["MOT_SPIN_MIN"],
+        parameters["MOT_SPIN_MAX"],
+    )
+    return curve.thrust((outputs - low) / (high - low)) * _air_density(altitude_m)
 
 
 def _voltage_ratio(voltage: float, parameters: Mapping[str, float]) -> float:

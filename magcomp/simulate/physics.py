@@ -117,6 +117,7 @@ def advance(
     truth: Truth,
     earth: FloatArray,
     rng: np.random.Generator,
+    tested: FloatArray | None = None,
 ) -> tuple[State, Block]:
     """Let one block of time pass.
 
@@ -134,10 +135,17 @@ def advance(
         Field in north-east-down axes, mGauss, shape (3,).
     rng
         Source of all sensor noise.
+    tested
+        Thrust of each motor, 0 … 1, shape (4,), while a motor test drives them.
     """
-    demand = _demand(motion, powered)
+    if tested is None:
+        demand = _demand(motion, powered)
+        running = (motion.armed & powered)[:, None]
+    else:
+        demand = np.tile(tested, (len(motion.throttle), 1))
+        running = demand > 0.0
     thrust = np.clip(_lag(state.thrust, demand, _MOTOR_LAG_S), 0.0, 1.0)
-    motors = _motor_currents(thrust, motion.armed & powered, state.voltage, truth)
+    motors = _motor_currents(thrust, running, state.voltage, truth)
     current = truth.power.board_a + motors.sum(axis=-1)
     power = truth.power
     used = state.used_ah + float(current.sum()) * STEP_S / 3600.0
@@ -195,11 +203,11 @@ def _demand(motion: Motion, powered: bool) -> FloatArray:
 def _motor_currents(
     thrust: FloatArray, running: BoolArray, voltage: float, truth: Truth
 ) -> FloatArray:
-    """Each motor's current, A, shape (n, 4)."""
+    """Each motor's current, A, shape (n, 4), of those running, shape (n, 1) or (n, 4)."""
     power = truth.power
     # The same thrust takes the same power: what the battery lacks in volts it gives in amperes.
     full = power.full_a * power.full_v / voltage
-    return np.asarray((full * thrust**power.exponent + power.idle_a * running[:, None]) / MOTORS)
+    return np.asarray((full * thrust**power.exponent + power.idle_a * running) / MOTORS)
 
 
 def _open_circuit(truth: Truth, used_ah: float) -> float:

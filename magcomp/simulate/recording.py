@@ -7,7 +7,7 @@ from pathlib import Path
 
 from magcomp.errors import OutputError
 from magcomp.mavlink.records import record as record_of
-from magcomp.simulate.ground import DEFAULT_RATES, Asker
+from magcomp.simulate.ground import DEFAULT_RATES, PX4_RATES, Asker
 from magcomp.simulate.programs import Compensation, scenario
 from magcomp.simulate.truth import Truth
 from magcomp.simulate.vehicle import DEFAULT_START_UNIX_S, Frame, Vehicle
@@ -51,7 +51,8 @@ def write_tlog(
     calibrated: bool | None = None,
     compensation: Compensation = "off",
     parameters: Mapping[str, float] | None = None,
-    rates: Mapping[int, float] = DEFAULT_RATES,
+    rates: Mapping[int, float] | None = None,
+    autopilot: str = "ardupilot",
     start_unix_s: float = DEFAULT_START_UNIX_S,
 ) -> Truth:
     """Fly a programme without a link and write what a ground station would have recorded.
@@ -65,7 +66,9 @@ def write_tlog(
     parameters
         Parameters that differ at boot, for example ``{"BATT_MONITOR": 0}``.
     rates
-        Message number to the rate asked for, Hz.
+        Message number to the rate asked for, Hz; None for those of recordings of its firmware.
+    autopilot
+        ``"ardupilot"`` or ``"px4"``.
     start_unix_s
         Date of power-up, and of the first frame.
 
@@ -80,7 +83,9 @@ def write_tlog(
         Where the file cannot be written.
     """
     chosen = scenario(program, seed, calibrated=calibrated, compensation=compensation)
-    vehicle = Vehicle(chosen, start_unix_s=start_unix_s, parameters=parameters)
+    vehicle = Vehicle(chosen, start_unix_s=start_unix_s, parameters=parameters, autopilot=autopilot)
+    if rates is None:
+        rates = PX4_RATES if autopilot == "px4" else DEFAULT_RATES
     try:
         with path.open("wb") as stream:
             for frame in record(vehicle, rates=rates):

@@ -53,9 +53,16 @@ _LONGEST_MS = 60_000
 
 
 class Schedule:
-    """Interval and next due time of each streamed message."""
+    """Interval and next due time of each streamed message.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    telemetry
+        Messages that can be streamed, in the order in which one moment's are sent.
+    """
+
+    def __init__(self, telemetry: tuple[int, ...] = TELEMETRY) -> None:
+        self._telemetry = telemetry
         self._interval_ms: dict[int, int] = {}
         self._due_ms: dict[int, int] = {}
         self._next_ms: int | None = None
@@ -81,7 +88,9 @@ class Schedule:
         if self._next_ms is None or now_ms < self._next_ms:
             return []
         ready = [
-            message for message in TELEMETRY if self._due_ms.get(message, now_ms + 1) <= now_ms
+            message
+            for message in self._telemetry
+            if self._due_ms.get(message, now_ms + 1) <= now_ms
         ]
         for message in ready:
             following = self._due_ms[message] + self._interval_ms[message]

@@ -11,13 +11,12 @@ from numpy.typing import NDArray
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from magcomp.simulate.flight import GRAVITY
+from magcomp.simulate.moment import Moment
 from magcomp.simulate.motion import euler
-from magcomp.simulate.physics import Block
 from magcomp.simulate.truth import MOTORS
 
 FloatArray = NDArray[np.float64]
 
-_METRES_PER_DEGREE = 111_319.5
 _ABSENT_VOLTAGE = 65535
 _IMU_TEMPERATURE = 3500
 _SENSORS = 1_399_979_055
@@ -44,70 +43,28 @@ class Battery:
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class View(Moment):
     """What the autopilot knows at one step.
 
     Attributes
     ----------
-    boot_s, unix_s
-        Seconds since boot and since 1970.
-    block, step
-        The physics, and which of its ten steps.
     attitude
         Estimated roll, pitch and yaw at that step, radians, shape (3,).
     corrected
         Corrected field of each compass, mGauss, shape (3, 3).
-    throttle
-        Thrust demand as last read, 0 … 1.
+    demand
+        Thrust demand, 0 … 1; 0 where the motors are not armed.
     outputs
         Servo outputs of the motors, microseconds, shape (4,).
-    home
-        Latitude and longitude in degrees, metres above sea level.
     battery
         The battery monitor.
     """
 
-    boot_s: float
-    unix_s: float
-    block: Block
-    step: int
     attitude: FloatArray
     corrected: FloatArray
-    throttle: float
+    demand: float
     outputs: FloatArray
-    home: tuple[float, float, float]
     battery: Battery | None
-
-    @property
-    def boot_ms(self) -> int:
-        """Milliseconds since boot."""
-        return round(self.boot_s * 1e3)
-
-    @property
-    def boot_us(self) -> int:
-        """Microseconds since boot."""
-        return round(self.boot_s * 1e6)
-
-    @property
-    def position(self) -> FloatArray:
-        """Metres north, east and down from home, shape (3,)."""
-        return np.asarray(self.block.motion.position[self.step])
-
-    @property
-    def velocity(self) -> FloatArray:
-        """North, east and down, m/s, shape (3,)."""
-        return np.asarray(self.block.motion.velocity[self.step])
-
-    def geodetic(self) -> tuple[int, int, float]:
-        """Latitude and longitude in 1e-7 degrees, metres above sea level."""
-        north, east, down = self.position
-        latitude, longitude, altitude = self.home
-        east_degree = _METRES_PER_DEGREE * np.cos(np.radians(latitude))
-        return (
-            round((latitude + north / _METRES_PER_DEGREE) * 1e7),
-            round((longitude + east / east_degree) * 1e7),
-            altitude - down,
-        )
 
 
 def build(message: int, view: View) -> Any | None:
@@ -115,7 +72,7 @@ def build(message: int, view: View) -> Any | None:
     return _BUILDERS[message](view)
 
 
-def _whole(value: FloatArray) -> list[int]:
+def cut(value: FloatArray) -> list[int]:
     """Cut towards zero and keep within 16 bits, as the firmware's conversion does."""
     return [min(max(int(each), -32768), 32767) for each in value.tolist()]
 
@@ -138,19 +95,19 @@ def _servo_output_raw(view: View) -> Any:
 
 
 def _imu_fields(view: View, imu: int) -> list[int]:
-    accel = _whole(view.block.accel[imu, view.step] * 1000.0 / GRAVITY)
-    return accel + _whole(view.block.gyro[imu, view.step] * 1000.0)
+    accel = cut(view.block.accel[imu, view.step] * 1000.0 / GRAVITY)
+    return accel + cut(view.block.gyro[imu, view.step] * 1000.0)
 
 
 def _raw_imu(view: View) -> Any:
-    mag = _whole(view.corrected[0])
+    mag = cut(view.corrected[0])
     return mavlink.MAVLink_raw_imu_message(
         view.boot_us, *_imu_fields(view, 0), *mag, 0, _IMU_TEMPERATURE
     )
 
 
 def _scaled_imu2(view: View) -> Any:
-    mag = _whole(view.corrected[1])
+    mag = cut(view.corrected[1])
     return mavlink.MAVLink_scaled_imu2_message(
         view.boot_ms, *_imu_fields(view, 1), *mag, _IMU_TEMPERATURE
     )
@@ -158,7 +115,7 @@ def _scaled_imu2(view: View) -> Any:
 
 def _scaled_imu3(view: View) -> Any:
     # Two IMUs and three compasses, as on the boards people fly.
-    mag = _whole(view.corrected[2])
+    mag = cut(view.corrected[2])
     return mavlink.MAVLink_scaled_imu3_message(view.boot_ms, *[0] * 6, *mag, 0)
 
 
@@ -181,7 +138,7 @@ def _vfr_hud(view: View) -> Any:
         airspeed=ground_speed,
         groundspeed=ground_speed,
         heading=int(np.degrees(view.attitude[2]) % 360.0),
-        throttle=int(view.throttle * 100.0),
+        throttle=int(view.demand * 100.0),
         alt=view.geodetic()[2],
         climb=-down,
     )
@@ -238,7 +195,7 @@ def _global_position_int(view: View) -> Any:
         longitude,
         round(altitude * 1e3),
         round((altitude - view.home[2]) * 1e3),
-        *_whole(view.velocity * 100.0),
+        *cut(view.velocity * 100.0),
         int(np.degrees(view.attitude[2]) % 360.0 * 100.0),
     )
 

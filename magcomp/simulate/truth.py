@@ -1,6 +1,6 @@
 """What a simulated vehicle really is: the numbers a fit is judged against.
 
-The file written by :meth:`Truth.write` has the form of sitl_fixtures/*.json.
+The document of :meth:`Truth.as_json` has the form of sitl_fixtures/*.json.
 """
 
 from __future__ import annotations
@@ -187,22 +187,6 @@ class Truth:
             document["start_mot"] = self.start_motor.tolist()
         return document
 
-    def write(self, path: Path) -> None:
-        """Write the truth file.
-
-        Raises
-        ------
-        OutputError
-            Where the file cannot be written.
-        """
-        try:
-            path.write_text(json.dumps(self.as_json(), indent=1) + "\n", encoding="utf-8")
-        except OSError as error:
-            raise OutputError(
-                f"{path} must be writable for the simulated vehicle's truth; "
-                f"instead received: {error.strerror or error}"
-            ) from error
-
     def parameters(self) -> Mapping[str, float]:
         """SIM_* parameters, by which the firmware's own simulation tells its truth."""
         values = dict(zip(_axes("SIM_MAG_MOT"), self.interference.tolist(), strict=True))
@@ -211,6 +195,23 @@ class Truth:
             values |= zip(_axes(f"SIM_MAG{number}_DIA"), compass.diagonal.tolist(), strict=True)
             values |= zip(_axes(f"SIM_MAG{number}_ODI"), compass.off_diagonal.tolist(), strict=True)
         return values | {"SIM_MAG_RND": self.noise, "SIM_BATT_VOLTAGE": self.power.full_v}
+
+
+def write_truth(path: Path, document: Mapping[str, Any]) -> None:
+    """Write a truth file.
+
+    Raises
+    ------
+    OutputError
+        Where the file cannot be written.
+    """
+    try:
+        path.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise OutputError(
+            f"{path} must be writable for the simulated vehicle's truth; "
+            f"instead received: {error.strerror or error}"
+        ) from error
 
 
 def _axes(name: str) -> tuple[str, str, str]:

@@ -1,15 +1,15 @@
 """The simulated vehicle: bytes in, bytes out, time passed in. No sockets, no clock.
 
-Time advances in ticks of 10 ms. Ten ticks make a block of physics, at whose end
-the autopilot reads battery, throttle and compass, as ArduCopter does at 10 Hz.
-Everything follows from the scenario, the seed in it and what is received when:
-the same input gives the same bytes.
+Time advances in ticks of 10 ms. Ten ticks make a block of physics; what the autopilot makes of it
+is its firmware's affair. Everything follows from the scenario, the seed in it and what is received
+when: the same input gives the same bytes.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,23 +17,26 @@ from numpy.typing import NDArray
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from magcomp import earth
-from magcomp.simulate import physics, telemetry
-from magcomp.simulate.ahrs import Ahrs
-from magcomp.simulate.autopilot import Autopilot
-from magcomp.simulate.correction import Correction
+from magcomp.errors import UsageError
+from magcomp.simulate import physics
+from magcomp.simulate.copter import Copter
+from magcomp.simulate.firmware import Firmware
 from magcomp.simulate.habits import Habits, own_number
-from magcomp.simulate.outputs import motor_outputs
-from magcomp.simulate.parameters import ParameterStore, initial_values
+from magcomp.simulate.moment import Moment
 from magcomp.simulate.pilot import Pilot
 from magcomp.simulate.programs import Scenario
+from magcomp.simulate.px4 import Px4
+from magcomp.simulate.truth import write_truth
 
 FloatArray = NDArray[np.float64]
 
 TICK_S = physics.STEP_S
 DEFAULT_START_UNIX_S = 1_750_000_000.0
 
+AUTOPILOTS: Mapping[str, type[Copter] | type[Px4]] = {"ardupilot": Copter, "px4": Px4}
+"""The firmware that a vehicle may have, by ``Vehicle.autopilot``."""
+
 _HEARTBEAT_TICKS = 100
-_TIMESYNC_TICKS = 1000
 _BOOT_TICKS = 150
 _FLYING_M = 0.5
 # MAVLink 2 signatures count tens of microseconds since 2015-01-01.
@@ -49,7 +52,7 @@ class Frame(NamedTuple):
 
 
 class Vehicle:
-    """An ArduCopter 4.6 that exists only as numbers.
+    """A quadrotor that exists only as numbers, with ArduCopter 4.6 or PX4 1.15.
 
     Parameters
     ----------
@@ -64,11 +67,18 @@ class Vehicle:
     signing_key
         32 bytes: sign every frame, and take none from the ground that is not signed with it.
     answers_errors
-        Send PARAM_ERROR where 4.6 is silent, as newer firmware does.
+        Send PARAM_ERROR where the firmware is silent, as newer firmware does.
+    autopilot
+        ``"ardupilot"`` or ``"px4"``.
     system
         MAVLink system number.
     habits
         What it is and does besides the ordinary.
+
+    Raises
+    ------
+    UsageError
+        For an autopilot that is none of these.
     """
 
     def __init__(
@@ -80,40 +90,43 @@ class Vehicle:
         wait_for_ground: bool = False,
         signing_key: bytes | None = None,
         answers_errors: bool = False,
+        autopilot: str = "ardupilot",
         system: int = 1,
         habits: Habits | None = None,
     ) -> None:
-        self.truth = scenario.truth
-        seed, habits = scenario.truth.seed, habits or Habits()
+        if autopilot not in AUTOPILOTS:
+            raise UsageError(
+                f"The simulated vehicle's autopilot must be one of {', '.join(AUTOPILOTS)}; "
+                f"instead received {autopilot!r}"
+            )
+        self.truth = truth = scenario.truth
+        habits = habits or Habits()
         if habits.uid is None:
-            habits = replace(habits, uid=own_number(seed))
+            habits = replace(habits, uid=own_number(truth.seed))
         self._program = scenario.begin()
         self._pilot = Pilot(self._program)
         self._mode = scenario.mode
         self._start_unix_s = start_unix_s
-        self._store = ParameterStore(
-            {**initial_values(scenario.truth), **(parameters or {})},
-            storage_s=habits.storage_s,
-            seed=seed,
+        self._rng = np.random.default_rng([truth.seed, 3])
+        self._field = earth.expected_field(*truth.home, start_unix_s)
+        self._firmware: Firmware = AUTOPILOTS[autopilot](
+            truth,
+            parameters or {},
+            self._field,
+            self._rng,
+            system=system,
+            habits=habits,
+            answers_errors=answers_errors,
         )
-        self._autopilot = Autopilot(
-            self._store, system, answers_errors=answers_errors, habits=habits
-        )
-        self._correction = Correction(self._store)
+        self._talker = self._firmware.talker
         self._signing_key = signing_key
         self._tick = 0
         self._boot_tick = 0
         self._codec = self._new_codec()
-        self._rng = np.random.default_rng([scenario.truth.seed, 3])
-        self._field = earth.expected_field(*scenario.truth.home, start_unix_s)
         self._program_tick: int | None = None if wait_for_ground else 0
         self._wants_armed = False
         self._sent: list[Frame] = []
         self._physics = physics.initial_state(self.truth, self._rng)
-        self._ahrs = Ahrs(tilt=np.zeros(2))
-        self._throttle = 0.0
-        self._battery: telemetry.Battery | None = None
-        self._corrected = np.zeros((3, 3))
         self._start_block()
 
     @property
@@ -124,12 +137,17 @@ class Vehicle:
     @property
     def armed(self) -> bool:
         """Whether the motors are armed."""
-        return self._autopilot.armed
+        return self._talker.armed
+
+    @property
+    def spinning(self) -> tuple[int, ...]:
+        """The motors that a motor test drives at this moment, counted from 1."""
+        return self._firmware.spinning
 
     @property
     def parameters(self) -> Mapping[str, float]:
         """What the autopilot holds."""
-        return self._store.values
+        return self._firmware.parameters
 
     @property
     def program_over(self) -> bool:
@@ -139,7 +157,7 @@ class Vehicle:
     @property
     def heading_error(self) -> float:
         """How far the autopilot's heading is off the true one, radians."""
-        return self._ahrs.heading_error or 0.0
+        return self._firmware.heading_error
 
     @property
     def true_position(self) -> FloatArray:
@@ -150,6 +168,21 @@ class Vehicle:
     def duration_s(self) -> float:
         """How long the programme takes."""
         return self._program.duration_s
+
+    @property
+    def firmware(self) -> Firmware:
+        """Its autopilot, inside which nobody on the link can look."""
+        return self._firmware
+
+    def write_truth(self, path: Path) -> None:
+        """Write what the vehicle really is.
+
+        Raises
+        ------
+        OutputError
+            Where the file cannot be written.
+        """
+        write_truth(path, self._firmware.truth())
 
     def fly_again(self) -> None:
         """Carry the programme out once more, with what the autopilot holds by now."""
@@ -167,9 +200,9 @@ class Vehicle:
             self._program_tick = self._tick
         if self._tick < self._boot_tick:
             return
-        self._autopilot.handle(message, self._boot_ms)
+        self._talker.handle(message, self._boot_ms)
         self._flush()
-        if self._autopilot.reboot_wanted:
+        if self._talker.reboot_wanted:
             self.reboot()
 
     def advance(self, time: float) -> list[Frame]:
@@ -180,28 +213,23 @@ class Vehicle:
 
     def arm(self) -> None:
         """Arm, as by a pilot whom nobody expects."""
-        self._autopilot.arm(force=True)
+        self._talker.arm(force=True)
 
     def disarm(self) -> None:
         """Disarm, wherever it is."""
-        self._autopilot.disarm(force=True)
+        self._talker.disarm(force=True)
 
     def reboot(self) -> None:
         """Restart: motors off, streams forgotten, stored parameters kept, a moment's silence."""
-        self._store.settle(self.time)
-        self._store.reboot()
         self._boot_tick = self._tick + _BOOT_TICKS
         self._codec = self._new_codec()
-        self._autopilot.start_up()
-        self._ahrs = Ahrs(tilt=np.zeros(2))
+        self._firmware.reboot(self.time)
         self._wants_armed = False
 
     def _new_codec(self) -> Any:
         """Sequence numbers from 0; signatures stamped with the vehicle's own time."""
-        autopilot = self._autopilot
-        codec: Any = mavlink.MAVLink(
-            None, srcSystem=autopilot.system, srcComponent=autopilot.component
-        )
+        talker = self._talker
+        codec: Any = mavlink.MAVLink(None, srcSystem=talker.system, srcComponent=talker.component)
         if self._signing_key is not None:
             codec.signing.secret_key = self._signing_key
             codec.signing.sign_outgoing = True
@@ -223,10 +251,17 @@ class Vehicle:
             if step == 0 and self._tick:
                 self._start_block()
             self._tick += 1
-            if step == physics.STEPS - 1:
-                self._read_sensors()
+            moment = Moment(
+                time=self.time,
+                boot_s=self._boot_ms / 1e3,
+                unix_s=self._start_unix_s + self.time,
+                block=self._block,
+                step=step,
+                home=self.truth.home,
+            )
+            self._firmware.sense(moment)
             if self._tick > self._boot_tick:
-                self._speak(step)
+                self._speak(moment)
 
     def _start_block(self) -> None:
         """Work out the coming tenth of a second."""
@@ -236,9 +271,15 @@ class Vehicle:
             begun = self._tick - self._program_tick
             motion = self._pilot.block(begun, self.heading_error)
         self._obey(bool(motion.armed[-1]))
-        self._autopilot.flying = bool(motion.position[-1, 2] < -_FLYING_M)
+        self._talker.flying = bool(motion.position[-1, 2] < -_FLYING_M)
         self._physics, self._block = physics.advance(
-            self._physics, motion, self.armed, self.truth, self._field.ned, self._rng
+            self._physics,
+            motion,
+            self.armed,
+            self.truth,
+            self._field.ned,
+            self._rng,
+            self._firmware.tested(),
         )
 
     def _obey(self, wants_armed: bool) -> None:
@@ -247,102 +288,28 @@ class Vehicle:
             return
         self._wants_armed = wants_armed
         if wants_armed:
-            self._autopilot.mode = self._mode
-            self._autopilot.arm()
+            self._firmware.fly(self._mode)
         else:
-            self._autopilot.disarm(force=True)
+            self._talker.disarm(force=True)
 
-    def _read_sensors(self) -> None:
-        """What ArduCopter does ten times a second."""
-        block = self._block
-        # Each sample of this reading was corrected with what was known when it began.
-        drive = self._drive() if self._store["COMPASS_PMOT_EN"] else None
-        current = 0.0 if self._battery is None else self._battery.current
-        self._corrected = self._correction.correct(block.raw, self._throttle, current, drive)
-        self._battery = self._read_battery()
-        self._throttle = float(block.motion.throttle[-1]) if self.armed else 0.0
-        middle = block.motion.earth_from_body[physics.STEPS // 2 - 2]
-        self._ahrs = self._ahrs.updated(
-            self._corrected[0], middle, self._field.declination, self._rng
-        )
-
-    def _read_battery(self) -> telemetry.Battery | None:
-        if not self._store["BATT_MONITOR"]:
-            return None
-        capacity = max(self._store["BATT_CAPACITY"] / 1e3, 1e-3)
-        return telemetry.Battery(
-            current=self._block.sensed_a,
-            voltage=self._block.sensed_v,
-            used_ah=self._block.used_ah,
-            left=min(max(1.0 - self._block.used_ah / capacity, 0.0), 1.0),
-        )
-
-    def _outputs(self, demand: FloatArray) -> FloatArray:
-        return motor_outputs(
-            demand,
-            armed=self.armed,
-            voltage=self._block.sensed_v,
-            altitude_m=self.truth.home[2],
-            parameters=self._store.values,
-        )
-
-    def _drive(self) -> FloatArray:
-        """Duty of each motor times the battery's voltage, V, shape (4,)."""
-        low, high = self._store["MOT_PWM_MIN"], self._store["MOT_PWM_MAX"]
-        duty = (self._outputs(self._block.demand[0]) - low) / max(high - low, 1.0)
-        return np.asarray(np.clip(duty, 0.0, 1.0) * self._block.sensed_v)
-
-    def _speak(self, step: int) -> None:
+    def _speak(self, moment: Moment) -> None:
         """Send what is due at this tick."""
-        autopilot = self._autopilot
-        since_boot = self._tick - self._boot_tick
-        if since_boot % _HEARTBEAT_TICKS == 0:
-            autopilot.outgoing.append(autopilot.heartbeat())
+        self._firmware.speak(moment)
+        if (self._tick - self._boot_tick) % _HEARTBEAT_TICKS == 0:
             self._accompany()
-        if since_boot % _TIMESYNC_TICKS == 0:
-            stamp = self._boot_ms * 1_000_000 + 1
-            autopilot.outgoing.append(mavlink.MAVLink_timesync_message(tc1=0, ts1=stamp))
-        autopilot.send_paced(self.time)
-        wanted = autopilot.schedule.due(self._boot_ms)
-        if wanted or autopilot.once:
-            self._report(wanted, step)
         self._flush()
-
-    def _report(self, wanted: list[int], step: int) -> None:
-        """Build telemetry messages."""
-        view = telemetry.View(
-            boot_s=self._boot_ms / 1e3,
-            unix_s=self._start_unix_s + self.time,
-            block=self._block,
-            step=step,
-            attitude=self._ahrs.attitude(self._block.motion.earth_from_body[step]),
-            corrected=self._corrected,
-            throttle=float(self._block.motion.throttle[step]) if self.armed else 0.0,
-            outputs=self._outputs(self._block.demand[step]),
-            home=self.truth.home,
-            battery=self._battery,
-        )
-        autopilot = self._autopilot
-        while autopilot.once:
-            message = autopilot.once.popleft()
-            if message == mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION:
-                autopilot.outgoing.append(autopilot.version())
-            else:
-                wanted = [message, *wanted]
-        built = (telemetry.build(message, view) for message in wanted)
-        autopilot.outgoing.extend(message for message in built if message is not None)
 
     def _accompany(self) -> None:
         """Let the other components of the system say that they are there."""
-        for component, message in self._autopilot.companions():
+        for component, message in self._talker.companions():
             codec: Any = mavlink.MAVLink(
-                None, srcSystem=self._autopilot.system, srcComponent=component
+                None, srcSystem=self._talker.system, srcComponent=component
             )
             self._sent.append(Frame(self.time, bytes(message.pack(codec))))
 
     def _flush(self) -> None:
         """Put what the autopilot wants to say into frames."""
-        outgoing = self._autopilot.outgoing
+        outgoing = self._talker.outgoing
         while outgoing:
             data = bytes(outgoing.popleft().pack(self._codec))
             self._codec.seq = (self._codec.seq + 1) % 256

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from magcomp.errors import InputError, LogError
+from magcomp.errors import InputError, NoLogError
 from magcomp.model import Recording
 from magcomp.sources.archive import is_archive, unpacked
 from magcomp.sources.formats import FORMATS, HEAD, Progress, format_of, is_log, other_of
@@ -39,7 +39,7 @@ def read(
     Raises
     ------
     LogError
-        The file cannot be read, or is no log that magcomp reads.
+        The file cannot be read; as NoLogError, it is not there or no log that magcomp reads.
     ChooseVehicleError
         The log holds several vehicles and none is chosen, or the chosen one is not in it.
     """
@@ -60,7 +60,7 @@ def _read(path: Path, choice: Choice, progress: Progress | None) -> Recording:
     other = other_of(head)
     if other is not None:
         wanted = " or ".join(each.title for each in FORMATS)
-        raise LogError(
+        raise NoLogError(
             f"Log {path} must be {wanted}; instead received {other.title}: {other.advice}."
         )
     # What nobody recognises may be a telemetry log whose beginning is damaged.

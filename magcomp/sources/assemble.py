@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from magcomp import autopilots
-from magcomp.errors import LogError
+from magcomp.errors import NoLogError
 from magcomp.mavlink.checksum import ByteArray, OffsetArray
 from magcomp.mavlink.frames import Frames, Scan, scan
 from magcomp.mavlink.heartbeat import Identity
@@ -130,7 +130,9 @@ def decode_vehicle(
     octets = np.frombuffer(data, dtype=np.uint8)
     found = scan(octets, wanted, crc_extra(), progress)
     if not found.verified:
-        raise LogError(f"Log {source} must hold MAVLink frames; instead received {_look(octets)}.")
+        raise NoLogError(
+            f"Log {source} must hold MAVLink frames; instead received {_look(octets)}."
+        )
     heartbeats = found.frames[found.frames.message == Message.HEARTBEAT]
     who = choose(source, heartbeats, decode(octets, heartbeats, Message.HEARTBEAT), choice)
     mine = (found.frames.system == who.system) & (found.frames.component == who.component)

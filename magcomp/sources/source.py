@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from magcomp.errors import LogError
+from magcomp.errors import LogError, NoLogError
 from magcomp.mavlink.checksum import ByteArray
 
 _TEXT_SHARE = 0.95
@@ -30,8 +30,10 @@ def mapped(path: str | Path) -> Iterator[ByteArray]:
 
     Raises
     ------
+    NoLogError
+        There is no such file, or it is not a regular file.
     LogError
-        There is no such file, it is not a regular file, or it cannot be read.
+        It cannot be read.
     """
     content = _map(Path(path))
     # Arrays still refer to the mapping when a caller's error is on its way; it closes with them.
@@ -43,12 +45,12 @@ def _map(path: Path) -> mmap.mmap | bytes:
         status = path.stat()
         if not stat.S_ISREG(status.st_mode):
             what = "a directory" if stat.S_ISDIR(status.st_mode) else "something that is no file"
-            raise LogError(f"Log {path} must be a file; instead received {what}.")
+            raise NoLogError(f"Log {path} must be a file; instead received {what}.")
         if not status.st_size:
             return b""
         with path.open("rb") as file:
             return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
     except FileNotFoundError:
-        raise LogError(f"Log {path} must exist; instead found no such file.") from None
+        raise NoLogError(f"Log {path} must exist; instead found no such file.") from None
     except (OSError, ValueError) as error:
         raise LogError(f"Log {path} must be readable; instead received: {error}.") from error

@@ -7,8 +7,8 @@ import sys
 from functools import partial
 from pathlib import Path
 
+from magcomp.report.ascii import is_ascii_only
 from magcomp.tui.app import MagcompApp
-from magcomp.tui.ascii import is_ascii_only
 from magcomp.tui.services import Services, open_live, read_log
 from magcomp.tui.settings import read_settings, settings_folder
 

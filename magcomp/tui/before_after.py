@@ -12,7 +12,7 @@ import numpy as np
 from magcomp import autopilots
 from magcomp.geometry import heading
 from magcomp.live.snapshot import CompassNow, LiveSnapshot
-from magcomp.model import THROTTLE, Analysis, FloatArray, InForce
+from magcomp.model import Analysis, FloatArray, InForce, quantity_of
 from magcomp.tui.work import Work, Writing
 
 
@@ -164,7 +164,7 @@ def _with_fit(
     if result is None or held is None:
         return None
     u_held = _u(held, live)
-    u = live.throttle if result.fit.regressor == THROTTLE else live.current
+    u = quantity_of(result.fit.regressor).of(current=live.current, throttle=live.throttle)
     if u is None or u_held is None:
         return None
     raw = held.correction.undo(np.array([now.field]), np.array([u_held]))
@@ -182,7 +182,7 @@ def _u(in_force: InForce, live: LiveSnapshot) -> float | None:
     """What the autopilot multiplies by; 0 where its compensation is off, None where not known."""
     if in_force.regressor is None:
         return 0.0
-    return live.throttle if in_force.regressor == THROTTLE else live.current
+    return quantity_of(in_force.regressor).of(current=live.current, throttle=live.throttle)
 
 
 def _heading(field: FloatArray, live: LiveSnapshot) -> float | None:

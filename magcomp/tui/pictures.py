@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from magcomp.model import CURRENT, CompassResult, FloatArray
+from magcomp.model import CompassResult, FloatArray, quantity_of
 from magcomp.report import words
 from magcomp.report.evidence import CompassPlots
 
@@ -80,7 +80,8 @@ class Shift:
 def shift(result: CompassResult) -> Shift:
     """Centres and line of one compass; docs/method.md, Fig. 4, seen along each axis."""
     fit = result.fit
-    scale = 1.0 if fit.regressor == CURRENT else 100.0
+    quantity = quantity_of(fit.regressor)
+    scale = quantity.scale
     rest = fit.correction.centre(0.0)
     u = np.array([level.u for level in fit.levels])
     moved = [fit.correction.soft_iron @ (level.centre - rest) for level in fit.levels]
@@ -90,7 +91,7 @@ def shift(result: CompassResult) -> Shift:
         centres=np.array(moved).reshape(-1, 3),
         ends=scale * ends,
         lines=np.outer(ends, fit.interference),
-        title="current, A" if fit.regressor == CURRENT else "throttle, %",
+        title=f"{quantity.name}, {quantity.shown_unit}",
     )
 
 

@@ -1,21 +1,19 @@
 """Parameter files: Mission Planner .param, MAVProxy .parm, QGroundControl .params.
 
-The suffix chooses what is written. What is read is recognised row by row: two
-fields are name and value, five are QGroundControl's vehicle, component, name,
-value and type; fields stand apart by comma, space or tab. Lines that begin
-with ``#`` before the first row are comments for people, except one, which
-says whose parameters these are::
+The suffix chooses what is written. What is read is recognised row by row, see
+rows.py. Lines that begin with ``#`` before the first row are comments for
+people, except one, which says whose parameters these are::
 
     # magcomp-vehicle: {"autopilot": ..., "kind": "copter", "system": 1, ...}
 """
 
 from __future__ import annotations
 
+import codecs
 import json
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -25,45 +23,26 @@ from magcomp.errors import OutputError, ParameterFileError, UsageError
 from magcomp.mavlink.parameters import REAL32
 from magcomp.model import ParameterSet, Vehicle
 from magcomp.writing.owner import document, vehicle_of
+from magcomp.writing.rows import (
+    AUTOPILOT_COMPONENT,
+    Row,
+    check_name,
+    is_remark,
+    parse_row,
+    rounded,
+    shown,
+    values_of,
+)
 
 SUFFIXES = (".param", ".parm", ".params")
 
 _LARGEST_FILE = 16 * 1024 * 1024
-_AUTOPILOT_COMPONENT = 1
 
-_NAME = re.compile(r"[A-Z0-9_]{1,16}", re.ASCII)
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
-_NOT_FINITE = re.compile(r"[+-]?(nan|inf|infinity)", re.IGNORECASE)
-_SEPARATOR = re.compile(r"[ \t]*,[ \t]*|[ \t]+")
 _NOT_TEXT = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")
 
 _VEHICLE_MARK = "magcomp-vehicle:"
 _QGC_TITLE = "Onboard parameters for Vehicle"
 _QGC_COLUMNS = "Vehicle-Id Component-Id Name Value Type"
-
-
-@dataclass(frozen=True)
-class _Row:
-    line: int
-    name: str
-    value: float
-    system: int | None = None
-    component: int | None = None
-
-
-def as_float32(value: float) -> float:
-    """Round to the nearest float32, the precision in which autopilots hold parameters.
-
-    Raises
-    ------
-    ValueError
-        Where the value is not finite, is beyond float32, or would become 0.
-    """
-    with np.errstate(over="ignore", under="ignore"):
-        rounded = float(np.float32(value))
-    if not np.isfinite(rounded) or (rounded == 0.0 and value != 0.0):
-        raise ValueError(f"a value must fit a 32-bit float; instead received {value!r}")
-    return rounded
 
 
 def format_value(value: float) -> str:
@@ -92,8 +71,12 @@ def read_parameter_file(path: str | Path) -> ParameterSet:
         raise ParameterFileError(
             f"{path} must be a parameter file; instead it is larger than 16 MiB"
         )
-    # Comments written on Windows need not be UTF-8; a damaged name fails as a name.
-    return parse_parameters(content.decode("utf-8-sig", errors="replace"), str(path))
+    # PowerShell writes UTF-16. Comments written on Windows need not be UTF-8; a damaged name
+    # fails as a name.
+    wide = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    return parse_parameters(
+        content.decode("utf-16" if wide else "utf-8-sig", errors="replace"), str(path)
+    )
 
 
 def parse_parameters(text: str, source: str) -> ParameterSet:
@@ -110,16 +93,16 @@ def parse_parameters(text: str, source: str) -> ParameterSet:
     -------
     ParameterSet
         Values rounded to float32. Where a QGroundControl file holds several
-        components of one vehicle, those of the autopilot.
+        components of one vehicle, those of the autopilot. Its warnings name what stands twice.
 
     Raises
     ------
     ParameterFileError
         At the first line that is no parameter: a bad name, a value that is not
-        finite or does not fit float32, a duplicate, two vehicles, binary data;
+        finite or does not fit float32, two vehicles, binary data;
         or where the file holds no parameter.
     """
-    rows: list[_Row] = []
+    rows: list[Row] = []
     comments: list[str] = []
     vehicle: Vehicle | None = None
     for number, line in enumerate(_lines(text), start=1):
@@ -129,8 +112,10 @@ def parse_parameters(text: str, source: str) -> ParameterSet:
                 f"{where}: a parameter file must be text; instead received binary data"
             )
         content, mark, comment = line.partition("#")
+        if is_remark(content.strip()):
+            continue
         if content.strip():
-            rows.append(_parse_row(content.strip(), number, where))
+            rows.append(parse_row(content.strip(), number, where))
             continue
         comment = comment.removeprefix(" ").rstrip()
         if not mark or comment.startswith(_QGC_TITLE) or comment == _QGC_COLUMNS:
@@ -145,7 +130,13 @@ def parse_parameters(text: str, source: str) -> ParameterSet:
             comments.append(comment)
     if not rows:
         raise ParameterFileError(f"{source} must hold parameters; instead received none")
-    return ParameterSet(_unique(rows, source), vehicle, tuple(comments))
+    values, warnings = values_of(rows, source)
+    return ParameterSet(values, vehicle, tuple(comments), warnings)
+
+
+def is_own(parameters: ParameterSet) -> bool:
+    """Whether magcomp wrote the file itself: all of it is meant, not only the calibration."""
+    return parameters.vehicle is not None
 
 
 def format_parameters(parameters: ParameterSet, suffix: str) -> str:
@@ -174,8 +165,8 @@ def format_parameters(parameters: ParameterSet, suffix: str) -> str:
     if not parameters.values:
         raise ParameterFileError("a parameter file must hold parameters; instead received none")
     for name, value in parameters.values.items():
-        _check_name(name, "to be written")
-        _rounded(value, name, "to be written")
+        check_name(name, "to be written")
+        rounded(value, name, "to be written")
     head = [_comment(line) for comment in parameters.comments for line in _comment_lines(comment)]
     if parameters.vehicle is not None:
         named = json.dumps(document(parameters.vehicle))
@@ -264,99 +255,13 @@ def _lines(text: str) -> Iterator[str]:
     return iter(normal.split("\n"))
 
 
-def _parse_row(content: str, number: int, where: str) -> _Row:
-    fields = _SEPARATOR.split(content)
-    match fields:
-        case [name, value]:
-            return _Row(number, _check_name(name, where), _parse_value(value, name, where))
-        case [system, component, name, value, _]:
-            return _Row(
-                number,
-                _check_name(name, where),
-                _parse_value(value, name, where),
-                _parse_identity(system, "vehicle", where),
-                _parse_identity(component, "component", where),
-            )
-        case _:
-            raise ParameterFileError(
-                f"{where}: a line must be NAME and VALUE, or QGroundControl's five columns; "
-                f"instead received {_shown(content)}"
-            )
-
-
-def _parse_identity(text: str, what: str, where: str) -> int:
-    if not re.fullmatch(r"\d{1,3}", text, re.ASCII) or int(text) > 255:
-        raise ParameterFileError(
-            f"{where}: the {what} must be a number from 0 to 255; instead received {_shown(text)}"
-        )
-    return int(text)
-
-
-def _check_name(name: str, where: str) -> str:
-    if not _NAME.fullmatch(name):
-        raise ParameterFileError(
-            f"{where}: a parameter name must be 1 to 16 of A-Z, 0-9 and _; "
-            f"instead received {_shown(name)}"
-        )
-    return name
-
-
-def _parse_value(text: str, name: str, where: str) -> float:
-    if _NOT_FINITE.fullmatch(text):
-        raise ParameterFileError(f"{where}: {name} must be finite; instead received {text}")
-    if not _NUMBER.fullmatch(text):
-        raise ParameterFileError(
-            f"{where}: {name} must be a number; instead received {_shown(text)}"
-        )
-    return _rounded(float(text), name, where, text)
-
-
-def _rounded(value: float, name: str, where: str, text: str | None = None) -> float:
-    try:
-        return as_float32(value)
-    except ValueError as error:
-        raise ParameterFileError(
-            f"{where}: {name} must fit a 32-bit float; "
-            f"instead received {_shown(text) if text else value}"
-        ) from error
-
-
-def _unique(rows: Iterable[_Row], source: str) -> Mapping[str, float]:
-    rows = list(rows)
-    if any(row.component == _AUTOPILOT_COMPONENT for row in rows):
-        rows = [row for row in rows if row.component in {None, _AUTOPILOT_COMPONENT}]
-    first: dict[str, _Row] = {}
-    for row in rows:
-        if row.system != rows[0].system:
-            raise ParameterFileError(
-                f"{source}, line {row.line}: a parameter file must belong to one vehicle; "
-                f"instead received {_named_system(row)} after {_named_system(rows[0])}"
-            )
-        earlier = first.setdefault(row.name, row)
-        if earlier is not row:
-            raise ParameterFileError(
-                f"{source}, line {row.line}: {row.name} must stand once; "
-                f"instead it stands in line {earlier.line} too"
-            )
-    return {row.name: row.value for row in rows}
-
-
-def _named_system(row: _Row) -> str:
-    return "a row without vehicle" if row.system is None else f"vehicle {row.system}"
-
-
 def _parse_vehicle(text: str, where: str) -> Vehicle:
     try:
         return vehicle_of(text)
     except ValueError as error:
         raise ParameterFileError(
-            f"{where}: the vehicle must be as magcomp wrote it; instead received {_shown(text)}"
+            f"{where}: the vehicle must be as magcomp wrote it; instead received {shown(text)}"
         ) from error
-
-
-def _shown(text: str) -> str:
-    text = text.strip()
-    return ascii(text if len(text) <= 40 else f"{text[:37]}...")
 
 
 def _comment_lines(comment: str) -> Iterator[str]:
@@ -383,7 +288,7 @@ def _mavproxy(parameters: ParameterSet) -> Iterator[str]:
 def _qgroundcontrol(parameters: ParameterSet) -> Iterator[str]:
     vehicle = parameters.vehicle
     system = vehicle.system if vehicle else 1
-    component = vehicle.component if vehicle else _AUTOPILOT_COMPONENT
+    component = vehicle.component if vehicle else AUTOPILOT_COMPONENT
     yield f"# {_QGC_TITLE} {system}"
     yield f"# {_QGC_COLUMNS}"
     for name, value in parameters.values.items():

@@ -3,20 +3,22 @@
 Motor compensation is switched by one parameter for all compasses (and, where
 per-motor compensation is built in, by one of its own). These are *switches*;
 offsets, soft iron and compensation vectors are *values*. Everything else in a
-parameter file is none of magcomp's business and is left out.
+parameter file is none of magcomp's business and is left out, unless asked for.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import math
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 
 from magcomp import autopilots
-from magcomp.autopilots import Kind
+from magcomp.autopilots import Autopilot, Kind
 from magcomp.errors import ParameterFileError, VehicleRefusedError, WriteError
 from magcomp.mavlink.version import is_numbered_board
 from magcomp.model import Compass, ParameterSet, Vehicle
-from magcomp.writing.files import as_float32, format_value
+from magcomp.writing.files import format_value
+from magcomp.writing.rows import as_float32
 
 _BOTH = 2
 
@@ -47,7 +49,7 @@ class WritePlan:
     identity
         Device ids by parameter name; must read the same before each write.
     left_out
-        Names of the parameter set that are not compass calibration.
+        Names of the parameter set that are not written: no compass calibration, or not known.
     warnings
         Sentences for the pilot.
     """
@@ -76,7 +78,9 @@ class WritePlan:
         return ParameterSet(self.old, self.vehicle)
 
 
-def relevant_names(autopilot: str, wanted: ParameterSet) -> tuple[str, ...]:
+def relevant_names(
+    autopilot: str, wanted: ParameterSet, *, everything: bool = False
+) -> tuple[str, ...]:
     """Names to read from a vehicle before a plan can be made.
 
     Parameters
@@ -85,9 +89,14 @@ def relevant_names(autopilot: str, wanted: ParameterSet) -> tuple[str, ...]:
         As in ``Vehicle.autopilot``.
     wanted
         What shall be written; its compass parameters are asked for as well.
+    everything
+        As for `plan`; all its parameters are asked for.
     """
-    names = autopilots.named(autopilot).relevant_names()
-    return tuple(dict.fromkeys((*names, *filter(_is_of_compass, wanted.values))))
+    firmware = autopilots.named(autopilot)
+    of_file = [
+        n for n in wanted.values if _is_of_compass(n) or (everything and _is_rest(n, firmware))
+    ]
+    return tuple(dict.fromkeys((*firmware.relevant_names(), *of_file)))
 
 
 def plan(
@@ -96,6 +105,7 @@ def plan(
     vehicle: Vehicle,
     *,
     any_vehicle: bool = False,
+    everything: bool = False,
 ) -> WritePlan:
     """Compare a vehicle with what is wanted.
 
@@ -109,46 +119,74 @@ def plan(
         The vehicle at the other end of the link.
     any_vehicle
         Write to a vehicle other than the set's.
+    everything
+        Write what is no compass calibration too, as far as the vehicle knows it and does not keep
+        it itself.
 
     Raises
     ------
     VehicleRefusedError
         Where the set belongs to another vehicle, or does not say whose it is.
     WriteError
-        Where the vehicle does not know a wanted parameter, or holds one that no
+        Where the vehicle does not know a wanted calibration parameter, or holds one that no
         backup could bring back.
     ParameterFileError
         Where nothing of the set is compass calibration, a value does not fit
         float32, or a switch has no such position.
     """
-    held = _held(current)
     autopilot = autopilots.of(vehicle)
+    rest = {
+        name
+        for name in wanted.values
+        if everything and _is_rest(name, autopilot) and math.isfinite(current.get(name, math.nan))
+    }
+    held = _held(current, rest)
     identity = {name: current[name] for name in autopilot.device_id_names if name in current}
     read = autopilot.compasses(current)
     vehicle = replace(vehicle, compasses=read) if read else vehicle
     warnings = _check_identity(wanted, vehicle, any_vehicle=any_vehicle)
-    unknown = [name for name in wanted.values if _is_of_compass(name) and name not in current]
+    unknown = [name for name in wanted.values if _is_calibration(name) and name not in current]
     if unknown:
         raise WriteError(
             f"{', '.join(unknown)} must exist on the vehicle; instead the vehicle does not know "
             f"{'it' if len(unknown) == 1 else 'them'}"
         )
-    asked = _asked(wanted)
+    asked = _asked(wanted, rest)
     return WritePlan(
         vehicle=vehicle,
         old=held,
-        new={n: v for n, v in asked.items() if not _is_switch(n) and v != held[n]},
+        new={n: asked[n] for n in _in_order(asked) if not _is_switch(n) and asked[n] != held[n]},
         switches={n: asked.get(n, v) for n, v in held.items() if _is_switch(n)},
         identity=identity,
         left_out=tuple(name for name in wanted.values if name not in asked),
-        warnings=(*warnings, *_warnings(vehicle, current, asked)),
+        warnings=(
+            *(f"{text}." for text in wanted.warnings),
+            *warnings,
+            *_warnings(vehicle, current, asked),
+        ),
     )
 
 
-def _held(current: Mapping[str, float]) -> dict[str, float]:
+def _in_order(names: Iterable[str]) -> list[str]:
+    """Motor vectors before offsets before soft iron, each vector together; all else after them.
+
+    A firmware may look at its parameters in the midst of a write (docs/autopilots.md, PX4: in
+    force): what belongs together should arrive together.
+    """
+
+    def place(name: str) -> tuple[int, int]:
+        found = autopilots.parse(name)
+        if found is None or not found.kind.is_value:
+            return len(Kind), 0
+        return int(found.kind), found.compass
+
+    return sorted(names, key=place)
+
+
+def _held(current: Mapping[str, float], rest: Collection[str]) -> dict[str, float]:
     held = {}
     for name, value in current.items():
-        if not _is_calibration(name):
+        if not _is_calibration(name) and name not in rest:
             continue
         try:
             held[name] = as_float32(value)
@@ -160,10 +198,10 @@ def _held(current: Mapping[str, float]) -> dict[str, float]:
     return held
 
 
-def _asked(wanted: ParameterSet) -> dict[str, float]:
+def _asked(wanted: ParameterSet, rest: Collection[str]) -> dict[str, float]:
     asked = {}
     for name, value in wanted.values.items():
-        if not _is_calibration(name):
+        if not _is_calibration(name) and name not in rest:
             continue
         try:
             asked[name] = as_float32(value)
@@ -186,6 +224,11 @@ def _asked(wanted: ParameterSet) -> dict[str, float]:
 def _is_calibration(name: str) -> bool:
     found = autopilots.parse(name)
     return found is not None and (found.kind is Kind.SWITCH or found.kind.is_value)
+
+
+def _is_rest(name: str, autopilot: Autopilot) -> bool:
+    """Whether it is no calibration, and the pilot's to set."""
+    return not _is_calibration(name) and autopilot.kept_names.fullmatch(name) is None
 
 
 def _is_switch(name: str) -> bool:
@@ -274,5 +317,5 @@ def _warnings(
     vehicle: Vehicle, current: Mapping[str, float], asked: Mapping[str, float]
 ) -> list[str]:
     autopilot, after = autopilots.of(vehicle), {**current, **asked}
-    found = (*autopilot.warnings(after), *autopilot.write_warnings(asked, after))
+    found = (*autopilot.warnings(after), *autopilot.write_warnings(asked, current))
     return [f"{text[:1].upper()}{text[1:]}." for text in found]

@@ -181,11 +181,12 @@ def read_current(
     vehicle: Vehicle,
     wanted: ParameterSet,
     *,
+    everything: bool = False,
     clock: Callable[[], float],
     on_event: Callable[[ReadProgress], None] = _ignore,
     timing: Timing | None = None,
 ) -> Mapping[str, float]:
-    """Read what `plan` must know of a vehicle: its compass calibration, by name.
+    """Read what `plan` must know of a vehicle, by name; ``everything`` as there.
 
     Raises
     ------
@@ -194,7 +195,7 @@ def read_current(
     LinkError
         Where the connection is lost for good.
     """
-    names = relevant_names(vehicle.autopilot, wanted)
+    names = relevant_names(vehicle.autopilot, wanted, everything=everything)
     return fetch(connection, vehicle, names, clock=clock, on_event=on_event, timing=timing)
 
 

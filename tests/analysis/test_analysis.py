@@ -106,7 +106,7 @@ def test_offsets_learned_in_the_hover_give_back_the_interference_they_swallowed(
     hover = 25.0
     learned = replace(
         EXACT,
-        offset=EXACT.offset + np.linalg.solve(EXACT.soft_iron, EXACT.motor) * hover,
+        offset=EXACT.offset + np.linalg.solve(EXACT.soft_iron, EXACT.vector) * hover,
         motor=np.zeros(3),
     )
     in_force = {"COMPASS_MOTCT": 0.0, **ardupilot.correction_parameters(learned, 1, 1.0)}
@@ -172,7 +172,7 @@ def test_where_every_compass_is_rejected_nothing_is_written():
 def test_a_user_who_insists_gets_the_whole_fit():
     found = analyse(disturbed(Flown(seed=5).recording(), 1))
     values = parameter_set(found, include_rejected=True).values
-    assert np.allclose(vector(values, "MOT", 1), found.compasses[0].fit.correction.motor)
+    assert np.allclose(vector(values, "MOT", 1), found.compasses[0].fit.correction.vector)
     assert values["COMPASS_MOTCT"] == 2.0
 
 

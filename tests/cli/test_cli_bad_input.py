@@ -24,6 +24,7 @@ from logs_made_of_logs import (
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from magcomp.cli.app import run
+from magcomp.cli.places import where_logs_are
 
 SINGLE = ("--compass", "1", "--regressor", "current")
 """The least work a fit can be."""
@@ -93,6 +94,10 @@ BAD: list[tuple[Callable[[Path], None], str]] = [
 ]
 
 
+NO_LOG = {absent, directory, empty, text, random, first_bytes}
+"""After these it is said where logs are."""
+
+
 @pytest.mark.parametrize("command", ["fit", "check"])
 @pytest.mark.parametrize(("make", "why"), BAD, ids=[make.__name__ for make, _ in BAD])
 def test_bad_input_gets_one_sentence(
@@ -110,7 +115,8 @@ def test_bad_input_gets_one_sentence(
     assert captured.out == ""
     assert captured.err.startswith("magcomp: ")
     assert captured.err.endswith((".\n", "?\n"))
-    assert captured.err.count("\n") == 1
+    assert captured.err.count("\n") == (2 if make in NO_LOG else 1)
+    assert (where_logs_are() in captured.err) == (make in NO_LOG)
     assert why in captured.err
 
 
@@ -182,8 +188,10 @@ def test_a_log_without_parameters_is_no_ground_to_write_anything(
     [
         ((), "command"),
         (("frobnicate",), "frobnicate"),
+        (("chek", "x.tlog"), "Did you mean 'check'? Try 'magcomp --help'."),
         (("fit",), "LOG"),
         (("fit", "x.tlog", "--frobnicate"), "--frobnicate"),
+        (("fit", "x.tlog", "--strat", "5"), "Did you mean '--start'?"),
         (("fit", "x.tlog", "--compass", "5"), "5"),
         (("fit", "x.tlog", "--method", "magic"), "magic"),
         (("fit", "x.tlog", "--start", "soon"), "soon"),

@@ -105,13 +105,33 @@ def test_an_armed_vehicle_is_refused(wanted, capsys):
 def test_another_vehicle_is_refused_and_unknown_parameters_are_named(tmp_path, capsys):
     theirs, unknown = tmp_path / "theirs.param", tmp_path / "unknown.param"
     write_parameter_file(theirs, ParameterSet({**COMPENSATION, "COMPASS_DEV_ID": 7.0}))
-    write_parameter_file(unknown, ParameterSet({"COMPASS_MOT9_X": 1.0}))
+    write_parameter_file(unknown, ParameterSet({"CAL_MAG0_XOFF": 1.0}))
     with alive(vehicle=landed()) as flown:
         common = (flown.address, "--yes", "--system", 1)
         assert magcomp("upload", theirs, *common) == ExitCode.LINK
         assert "with compasses 97539, 131874, 263178" in capsys.readouterr().err
         assert magcomp("upload", unknown, *common, "--any-vehicle") == ExitCode.WRITE
-        assert "COMPASS_MOT9_X" in capsys.readouterr().err
+        assert "CAL_MAG0_XOFF" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_of_a_full_file_the_calibration_is_written_and_on_request_the_rest(tmp_path, capsys):
+    full = tmp_path / "full.param"
+    with alive(vehicle=landed()) as flown:
+        rest = {"COMPASS_PRIMARY": 0.0, "BATT_MONITOR": 3.0, "COMPASS_DEV_ID": 97539.0}
+        before = flown.vehicle.parameters["BATT_MONITOR"]
+        write_parameter_file(full, ParameterSet({**COMPENSATION, **rest}))
+        common = (full, flown.address, "--yes", "--any-vehicle", "--system", 1)
+        assert magcomp("upload", *common) == ExitCode.GOOD
+        assert "--all writes the rest too" in capsys.readouterr().err
+        assert held(flown.vehicle) == COMPENSATION
+        assert flown.vehicle.parameters["BATT_MONITOR"] == before
+        backup = tmp_path / "b.param"
+        assert magcomp("upload", *common, "--all", "--backup", backup) == ExitCode.GOOD
+        assert "COMPASS_PRIMARY, COMPASS_DEV_ID are unknown" in capsys.readouterr().err
+        assert flown.vehicle.parameters["BATT_MONITOR"] == 3.0
+        assert magcomp("restore", backup, flown.address, "--yes", "--system", 1) == ExitCode.GOOD
+        assert flown.vehicle.parameters["BATT_MONITOR"] == before
 
 
 def test_a_backup_that_cannot_be_made_leaves_the_vehicle_untouched(wanted, tmp_path, capsys):
@@ -303,3 +323,14 @@ def test_a_simulated_vehicle_says_where_it_is_and_writes_its_truth(tmp_path):
 def test_impossible_vehicles_are_refused(options, capsys):
     assert magcomp("simulate", f"udp:127.0.0.1:{free_port()}", *options) == ExitCode.USAGE
     assert "Traceback" not in capsys.readouterr().err
+
+
+def test_what_a_short_address_means_is_said(tmp_path, capsys):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(("127.0.0.1", 0))
+        short = f":{taken.getsockname()[1]}"
+        assert magcomp("record", short, "-o", tmp_path / "a.tlog") == ExitCode.LINK
+        said = capsys.readouterr().err
+        assert f"{short} means udp:127.0.0.1{short}: listen for UDP from this computer only" in said
+        assert magcomp("record", f"udp:127.0.0.1{short}", "-o", tmp_path / "a.tlog")
+        assert "means" not in capsys.readouterr().err

@@ -115,6 +115,9 @@ def test_an_encoding_without_block_characters_is_enough() -> None:
     code, out, err = python("-m", "magcomp", "fit", str(SWEEP), "--compass", "1", env=environment)
     assert (code, err) == (0, b"")
     assert b"MARGINAL" in out
+    assert out.isascii()
+    assert b" deg" in out
+    assert b"?" not in out
 
 
 def on_a_terminal(*arguments: str) -> tuple[int, bytes, bytes]:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from magcomp.report import words
 from magcomp.report.as_json import dumps
-from magcomp.report.bars import Row, bar, bars
+from magcomp.report.bars import BEFORE_AFTER, Row, bar, lines
 
 
 @pytest.mark.parametrize(
@@ -77,7 +77,7 @@ def test_a_bar_is_as_long_as_its_value_says(value: float, other: float, width: i
 
 def test_all_bars_of_a_picture_have_one_scale() -> None:
     rows = [Row("0 A", (10.0, 5.0)), Row("10 A", (20.0, 2.5))]
-    _, first, second = bars("heading error", ("now", "corrected"), rows)
+    _, first, second = lines("heading error", ("now", "corrected"), rows, BEFORE_AFTER, 80)
     assert first.plain.count("█") == 11 + 5
     assert second.plain.count("█") == 22 + 2
 

@@ -35,7 +35,7 @@ angles = st.floats(-1.4, 1.4)
 def raw_reading(roll, pitch, yaw, u):
     """What the sensor says: the correction turned round."""
     field = body_from_earth(roll, pitch, yaw) @ EARTH
-    return np.linalg.solve(CORRECTION.soft_iron, field - u * CORRECTION.motor) - CORRECTION.offset
+    return np.linalg.solve(CORRECTION.soft_iron, field - u * CORRECTION.vector) - CORRECTION.offset
 
 
 def level_part(field, roll, pitch):
@@ -143,4 +143,4 @@ def test_in_force_knows_that_motor_compensation_is_off():
     values = ardupilot.correction_parameters(CORRECTION, 1, 1.0)
     found = ardupilot.ArduPilot().in_force({**values, "COMPASS_MOTCT": 0.0}, 1)
     assert found.regressor is None
-    assert not found.correction.motor.any()
+    assert not found.correction.vector.any()

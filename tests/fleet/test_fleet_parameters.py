@@ -26,7 +26,7 @@ def history(compass: int, motor: np.ndarray, *, agree: bool = True) -> CompassHi
 
 def test_the_middle_of_the_range_stays_as_it_was() -> None:
     fit = analysis(SWEEP).compasses[0].fit
-    moved = with_motor(fit, fit.correction.motor + np.array([0.5, -0.2, 0.1]))
+    moved = with_motor(fit, fit.correction.vector + np.array([0.5, -0.2, 0.1]))
     raw = np.array([[200.0, -100.0, 400.0], [-50.0, 300.0, 20.0]])
     middle = np.full(2, (fit.u_low + fit.u_high) / 2)
     np.testing.assert_allclose(
@@ -36,7 +36,7 @@ def test_the_middle_of_the_range_stays_as_it_was() -> None:
 
 def test_the_pooled_vector_is_what_is_written() -> None:
     of = analysis(SWEEP)
-    motor = of.compasses[0].fit.correction.motor + np.array([0.25, 0.0, -0.25])
+    motor = of.compasses[0].fit.correction.vector + np.array([0.25, 0.0, -0.25])
     made = pooled_set(recording(SWEEP), of, [history(1, motor)])
     alone = parameter_set(of)
     assert list(made.values) == list(alone.values)

@@ -56,7 +56,7 @@ def test_a_payload_that_comes_half_way_is_a_step_of_its_size(sound):
 
 def test_a_wire_that_moves_changes_what_the_motors_add(sound):
     late = sound.field[1].time > HALF_S
-    half = -0.5 * np.multiply.outer(late * amperes(sound), -EXACT.motor)
+    half = -0.5 * np.multiply.outer(late * amperes(sound), -EXACT.vector)
     departure = found(changed(sound, half))["motors"]
     assert departure.is_plain
     assert departure.degrees > 5.0

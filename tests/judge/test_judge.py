@@ -202,8 +202,8 @@ def test_a_flight_by_throttle_is_no_surer_than_the_bend_of_the_current_allows():
     fit, _ = judged(by_throttle(0.2, 0.6))
     assert fit.method == "flight"
     std = np.sqrt(np.diag(fit.covariance))
-    assert np.all(std[:3] >= 0.05 * np.linalg.norm(fit.correction.motor))
-    assert np.all(std[3:6] >= 0.025 * np.linalg.norm(fit.correction.motor) * fit.u_high)
+    assert np.all(std[:3] >= 0.05 * np.linalg.norm(fit.correction.vector))
+    assert np.all(std[3:6] >= 0.025 * np.linalg.norm(fit.correction.vector) * fit.u_high)
 
 
 def test_a_current_that_hardly_changed_asks_for_climbs_and_descents():
@@ -241,7 +241,7 @@ def test_an_exact_compensation_in_force_is_as_good_as_the_log_can_tell():
 
 
 def test_a_calibration_in_force_that_is_off_by_more_than_the_log_allows_does_not_stay():
-    wrong = replace(EXACT, motor=1.1 * EXACT.motor)
+    wrong = replace(EXACT, motor=1.1 * EXACT.vector)
     in_force = {"COMPASS_MOTCT": 2.0, **ardupilot.correction_parameters(wrong, 1, 1.0)}
     fit, _ = judged(Flown(seed=1, in_force=in_force).recording())
     assert not fit.kept

@@ -33,6 +33,10 @@ from magcomp.link.address import (
         ("tcpin:0.0.0.0:5760", TcpServer("0.0.0.0", 5760)),
         ("udp:14550", UdpServer("127.0.0.1", 14550)),
         ("udpin::14550", UdpServer("127.0.0.1", 14550)),
+        ("127.0.0.1:14550", UdpServer("127.0.0.1", 14550)),
+        ("0.0.0.0:14550", UdpServer("0.0.0.0", 14550)),
+        ("[::1]:14550", UdpServer("::1", 14550)),
+        (":14550", UdpServer("127.0.0.1", 14550)),
         ("tcpin:5760", TcpServer("127.0.0.1", 5760)),
         ("udp:[::1]:14550", UdpServer("::1", 14550)),
         ("/dev/ttyACM0", SerialLine("/dev/ttyACM0", 115200)),
@@ -59,7 +63,10 @@ def test_what_users_type_for_mavproxy_and_pymavlink_is_understood(text, address)
     [
         "",
         "14550",
-        "127.0.0.1:14550",
+        "localhost:14550",
+        "127.0.0.1:0",
+        "::1:14550",
+        "[127.0.0.1]:14550",
         "udpout:14550",
         "tcp::5760",
         "udp:",
@@ -96,7 +103,28 @@ def test_anything_else_is_refused_with_the_text_and_an_example(text):
 
 def test_a_refusal_of_something_unknown_shows_one_example_of_each_kind():
     with pytest.raises(AddressError, match=r"udp:.*udpout:.*tcp:.*/dev/tty.*COM7.*\.tlog"):
-        parse_address("127.0.0.1:14550")
+        parse_address("somewhere:14550")
+
+
+def test_a_misspelt_kind_of_address_is_guessed_but_not_taken():
+    with pytest.raises(AddressError, match=r"'upd:14550'\. Did you mean 'udp:14550'\?$"):
+        parse_address("upd:14550")
+
+
+@pytest.mark.parametrize(
+    ("text", "meaning"),
+    [
+        (":14550", "listen for UDP from this computer only, and answer who speaks"),
+        ("0.0.0.0:14550", "listen for UDP from the whole network, and answer who speaks"),
+        ("udp:[::1]:14550", "from this"),
+        ("udp:192.168.4.2:14550", "listen for UDP at 192.168.4.2"),
+        ("tcpin:vehicle:5760", "listen for one TCP connection at vehicle"),
+        ("udpout:10.0.0.1:14550", "speak first, by UDP"),
+        ("tcp:10.0.0.1:5760", "connect by TCP"),
+    ],
+)
+def test_an_address_says_what_it_means(text, meaning):
+    assert meaning in parse_address(text).meaning
 
 
 def test_the_baud_option_holds_where_the_address_says_none():

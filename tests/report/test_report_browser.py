@@ -7,11 +7,13 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 from chromium import Page, chromium_page, find_chromium
 from report_analyses import refused, still
 
 from magcomp.analysis import Options, analyse
+from magcomp.report import words
 from magcomp.report.as_html import html
 
 pytestmark = [
@@ -111,6 +113,70 @@ def test_it_prints_and_is_itself_again_afterwards(shown: Page, good: Path) -> No
     assert_clean(shown, good)
 
 
+MOVE = """(block, value, mode) => {
+  const find = (what) => document.querySelector(`${block} ${what}`);
+  const slider = find("input[type=range]");
+  slider.value = value;
+  slider.dispatchEvent(new Event("input", { bubbles: true }));
+  find(`input[value=${mode}]`).click();
+  return find(".said").textContent;
+}"""
+
+
+def move(page: Page, value: float, mode: str) -> str:
+    """Move the slider and the switch of compass 1; what the page then says."""
+    said: str = page.evaluate(f"({MOVE})('#compass-1', {value}, '{mode}')")
+    return said
+
+
+# A picture is drawn anew in the frame after the one in which its slider moved.
+TWO_FRAMES = "new Promise((go) => requestAnimationFrame(() => requestAnimationFrame(() => go(0))))"
+
+MIDDLE = """(name) => {
+  const trace = document.getElementById("cloud-1").data.find((each) => each.name === name);
+  return [trace.x, trace.y, trace.z].map((every) => {
+    const known = every.filter((value) => value !== null);
+    return known.reduce((sum, value) => sum + value, 0) / known.length;
+  });
+}"""
+
+
+def middle(page: Page, trace: str = "readings") -> list[float]:
+    """Mean position of a trace of the field in space."""
+    found: list[float] = page.evaluate(f"({MIDDLE})('{trace}')")
+    return found
+
+
+def test_the_slider_moves_cloud_centre_and_needle(shown: Page) -> None:
+    compass = still().document["compasses"][0]
+    centre = still().analysis.compasses[0].fit.correction.centre
+    hand = "document.querySelector('#compass-1 .hand').getAttribute('transform')"
+    turn = {}
+    place = {}
+    for value in (20, 80):
+        move(shown, value, "raw")
+        shown.wait_for(f"document.querySelector('#compass-1 output').textContent === '{value} %'")
+        shown.evaluate(TWO_FRAMES)
+        place[value] = np.array([middle(shown), middle(shown, "centre")])
+        turn[value] = float(re.findall(r"[\d.]+", shown.evaluate(hand))[0])
+    for moved in place[80] - place[20]:
+        assert moved == pytest.approx(centre(0.8) - centre(0.2), abs=0.2)
+    for row in compass["heading_error_deg"]:
+        if round(100 * row["u"]) in turn:
+            assert turn[round(100 * row["u"])] == pytest.approx(max(row["before"], row["p95"]))
+
+
+def test_corrected_readings_stand_still_and_the_needle_is_within_the_bound(shown: Page) -> None:
+    compass = still().document["compasses"][0]
+    rows = {round(100 * row["u"]): row for row in compass["heading_error_deg"]}
+    for value in (20, 80):
+        said = move(shown, value, "corrected")
+        assert f"at most {words.degrees(rows[value]['p95'])} wrong" in said
+        shown.evaluate(TWO_FRAMES)
+        assert np.abs(middle(shown, "centre")).max() < 0.5
+    move(shown, 50, "measured")
+
+
 def test_three_compasses_print_on_five_pages(browser: Page, tmp_path: Path) -> None:
     made = still()
     path = tmp_path / "three.html"
@@ -125,6 +191,41 @@ def test_a_phone_shows_a_rejected_fit_without_scrolling_sideways(browser: Page, 
     show(browser, bad, width=390)
     assert_clean(browser, bad)
     assert browser.evaluate("document.documentElement.scrollWidth") <= 390
+
+
+AXE = """axe.run(document, { resultTypes: ["violations"] }).then(({ violations }) =>
+  violations.map(({ impact, id, nodes }) => `${impact}: ${id}: ${nodes.map((n) => n.target)}`))"""
+
+
+@pytest.mark.parametrize(("which", "width"), [("good", 1280), ("bad", 390)])
+def test_axe_finds_nothing(
+    browser: Page, which: str, width: int, request: pytest.FixtureRequest
+) -> None:
+    axe = Path(pytest.importorskip("axe_core_python").__file__).with_name("axe.min.js")
+    for scheme in ("light", "dark"):
+        show(browser, request.getfixturevalue(which), width)
+        prefer(browser, scheme)
+        browser.evaluate(axe.read_text(encoding="utf-8") + ";0")
+        assert browser.evaluate(AXE) == []
+
+
+CLIPPED = """[...document.querySelectorAll(".canvas")].flatMap((canvas) => {
+  const frame = canvas.getBoundingClientRect();
+  return [...canvas.querySelectorAll("svg text")].filter((text) => {
+    const box = text.getBoundingClientRect();
+    return box.width && (box.left < frame.left - 1 || box.right > frame.right + 1
+      || box.top < frame.top - 1 || box.bottom > frame.bottom + 1);
+  }).map((text) => `${canvas.id}: ${text.textContent}`);
+})"""
+
+
+@pytest.mark.parametrize("which", ["good", "bad"])
+@pytest.mark.parametrize("width", [390, 1280])
+def test_no_label_is_cut(
+    browser: Page, which: str, width: int, request: pytest.FixtureRequest
+) -> None:
+    show(browser, request.getfixturevalue(which), width)
+    assert browser.evaluate(CLIPPED) == []
 
 
 def test_the_check_would_notice_an_error_and_a_request(browser: Page, tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ from magcomp.errors import OutputError
 from magcomp.simulate import Truth, Vehicle, record, scenario, write_tlog
 from magcomp.simulate.ground import DEFAULT_RATES
 from magcomp.simulate.outputs import motor_outputs
+from magcomp.simulate.truth import write_truth
 from magcomp.sources import read
 
 FIXTURES = Path(__file__).parents[2] / "sitl_fixtures"
@@ -128,7 +129,7 @@ def test_without_a_battery_monitor_there_is_no_current(tmp_path):
 
 
 def test_the_truth_file_has_the_fixtures_form(simulated, tmp_path):
-    simulated[1].write(tmp_path / "truth.json")
+    write_truth(tmp_path / "truth.json", simulated[1].as_json())
     written = json.loads((tmp_path / "truth.json").read_text())
     # Beside a .tlog: the simulated vehicle is an ArduCopter, and PX4's truth has another form.
     ours = [path for path in FIXTURES.glob("*.json") if path.with_suffix(".tlog").exists()]
@@ -144,7 +145,7 @@ def test_the_truth_file_has_the_fixtures_form(simulated, tmp_path):
 
 def test_a_truth_file_that_cannot_be_written_is_one_sentence(simulated, tmp_path):
     with pytest.raises(OutputError, match=r"nowhere.*must be writable"):
-        simulated[1].write(tmp_path / "nowhere" / "truth.json")
+        write_truth(tmp_path / "nowhere" / "truth.json", simulated[1].as_json())
 
 
 def test_the_simulation_parameters_tell_the_truth(simulated):

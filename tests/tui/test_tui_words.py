@@ -19,7 +19,7 @@ from textual.color import Color
 from magcomp.analysis import Options
 from magcomp.live.progress import Bound, HoverBound, hover_bound
 from magcomp.model import Grade, ParameterSet
-from magcomp.tui.ascii import is_ascii_only, plain
+from magcomp.report.ascii import is_ascii_only, plain
 from magcomp.tui.before_after import HeadingPair, HeadingWatch, heading_pairs
 from magcomp.tui.changes import after_event, change_rows
 from magcomp.tui.fits import difference_deg, fit_rows
@@ -92,7 +92,7 @@ def test_in_sunlight_every_colour_stands_out_seven_to_one():
 def test_fits_that_agree_are_not_apart_and_one_per_ampere_off_is_apart_by_its_angle():
     one = made.result(1).fit
     assert difference_deg(one, one) < 1e-9
-    off = replace(one.correction, motor=one.correction.motor + np.array([0.0, 1.0, 0.0]))
+    off = replace(one.correction, motor=one.correction.vector + np.array([0.0, 1.0, 0.0]))
     horizontal = np.sqrt(one.strength**2 - one.vertical**2)
     level = np.degrees(np.arcsin(min(54.0 / horizontal, 1.0)))
     assert difference_deg(one, replace(one, correction=off)) >= level * 0.95

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import truth
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -130,11 +131,59 @@ def test_values_are_as_short_as_float32_allows(value: float, text: str) -> None:
         "A   +1.5e0 # why",
         "A,1.5#why",
         "1\t1\tA\t1.5\t9",
+        "A=1.5",
+        "A = 1.5",
+        "A 1.5 @READONLY",
+        "A,1.5,@ReadOnly # why",
+        "A,1.5,,",
+        "// a remark\nA\t=\t1.5",
+        "; a remark\nA\t\t1.5",
     ],
 )
 def test_commas_spaces_tabs_and_trailing_comments_are_read(row: str) -> None:
     text = f"# head\n\n{row}\n# tail\n"
     assert parse_parameters(text, "file") == ParameterSet({"A": 1.5}, None, ("head",))
+
+
+@pytest.mark.parametrize(("text", "value"), [("0x0F", 15.0), ("0Xff", 255.0), ("0x0", 0.0)])
+def test_a_hexadecimal_value_is_read(text: str, value: float) -> None:
+    assert parse_parameters(f"A,{text}\n", "file").values == {"A": value}
+
+
+def test_of_a_name_that_stands_twice_the_last_value_counts_and_the_pilot_is_told() -> None:
+    read = parse_parameters("A,1\nB,2\nA,3\nB,2\n", "file")
+    assert read.values == {"A": 3.0, "B": 2.0}
+    assert read.warnings == (
+        "file: A stands in line 1 and, with another value, in line 3; the last one counts",
+    )
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "utf-16-le", "utf-16-be"])
+def test_a_file_that_windows_wrote_is_read(tmp_path: Path, encoding: str) -> None:
+    path = tmp_path / "windows.param"
+    mark = "\ufeff" if encoding[-2:] in ("le", "be") else ""
+    path.write_bytes(f"{mark}# 20 °C\r\nA,1\r\n".encode(encoding))
+    assert read_parameter_file(path) == ParameterSet({"A": 1.0}, None, ("20 °C",))
+
+
+@pytest.mark.parametrize(
+    ("name", "count"),
+    [
+        ("made_equals.param", 5),
+        ("made_hex.param", 6),
+        ("made_name_twice.param", 5),
+        ("made_readonly.param", 6),
+        ("iris_plus.param", 0),
+        ("copter_3.5.5_qgc.params", 0),
+    ],
+)
+def test_files_of_the_wild_are_read(name: str, count: int) -> None:
+    path = truth.REAL / name
+    if not path.exists():
+        pytest.skip("the real files are not here")
+    read = read_parameter_file(path)
+    assert len(read.values) == (count or len(read.values))
+    assert len(read.warnings) == (name == "made_name_twice.param")
 
 
 def test_of_several_components_the_autopilot_counts() -> None:
@@ -147,13 +196,17 @@ def test_of_several_components_the_autopilot_counts() -> None:
     [
         ("", "hold parameters"),
         ("# only words\n", "hold parameters"),
-        ("A,1\nB,2\nA,1\n", "file, line 3: A must stand once; instead it stands in line 1"),
         ("A,1\nB,nan\n", "file, line 2: B must be finite; instead received nan"),
         ("A,-inf\n", "line 1: A must be finite"),
         ("A,1e39\n", "line 1: A must fit a 32-bit float; instead received '1e39'"),
         ("A,1e-60\n", "must fit a 32-bit float"),
         ("A,one\n", "must be a number; instead received 'one'"),
         ("A,1_000\n", "must be a number"),
+        ("A,0x\n", "must be a number; instead received '0x'"),
+        ("A,0x123456789\n", "must be a number"),
+        ("A,\n", "must be NAME and VALUE"),
+        ("A=\n", "must be a number; instead received ''"),
+        ("A 1 @WRITEONLY\n", "must be NAME and VALUE"),
         ("A,1,5\n", "must be NAME and VALUE"),
         ("a,1\n", "name must be 1 to 16 of A-Z, 0-9 and _; instead received 'a'"),
         ("ABCDEFGHIJKLMNOPQ,1\n", "instead received 'ABCDEFGHIJKLMNOPQ'"),

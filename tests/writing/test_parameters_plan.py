@@ -93,6 +93,47 @@ def test_what_is_not_compass_calibration_is_left_out() -> None:
     assert [change.name for change in todo.changes] == ["COMPASS_MOT_X"]
 
 
+FULL = wanting(
+    COMPASS_MOT_X=5.0,
+    COMPASS_PRIMARY=0.0,
+    COMPASS_DEV_ID=float(DEVICES[0]),
+    STAT_RUNTIME=9.0,
+    ARMING_CHECK=1.0,
+    COMPASS_USE2=0.0,
+    OLD_NAME=3.0,
+)
+"""As an old firmware saved it: the vehicle no longer knows COMPASS_PRIMARY and OLD_NAME."""
+NOW = {**HELD, "ARMING_CHECK": 72.0, "COMPASS_USE2": 1.0, "STAT_RUNTIME": 5.0}
+
+
+def test_of_an_old_full_file_only_the_compass_calibration_is_written() -> None:
+    todo = plan(NOW, FULL, QUAD)
+    assert [change.name for change in todo.changes] == ["COMPASS_MOT_X"]
+    assert set(todo.left_out) == set(FULL.values) - {"COMPASS_MOT_X"}
+
+
+def test_the_rest_of_a_full_file_is_written_on_request_and_can_be_brought_back() -> None:
+    todo = plan(NOW, FULL, QUAD, everything=True)
+    assert todo.changes == (
+        Change("COMPASS_MOT_X", OLD["COMPASS_MOT_X"], 5.0),
+        Change("ARMING_CHECK", 72.0, 1.0),
+        Change("COMPASS_USE2", 1.0, 0.0),
+    )
+    assert todo.left_out == ("COMPASS_PRIMARY", "COMPASS_DEV_ID", "STAT_RUNTIME", "OLD_NAME")
+    back = plan({**NOW, **todo.new}, todo.backup, QUAD, everything=True)
+    assert {c.name: c.new for c in back.changes} == {c.name: c.old for c in todo.changes}
+
+
+def test_of_the_rest_what_no_backup_could_bring_back_is_left_out() -> None:
+    todo = plan({**NOW, "ARMING_CHECK": float("nan")}, FULL, QUAD, everything=True)
+    assert "ARMING_CHECK" in todo.left_out
+
+
+def test_what_a_file_leaves_in_doubt_is_warned_about() -> None:
+    wanted = replace(wanting(COMPASS_MOT_X=5.0), warnings=("A stands twice",))
+    assert plan(HELD, wanted, QUAD).warnings == ("A stands twice.",)
+
+
 @pytest.mark.parametrize(
     ("wanted", "message"),
     [
@@ -107,8 +148,8 @@ def test_a_set_that_makes_no_sense_is_refused(wanted: ParameterSet, message: str
 
 
 def test_a_name_the_vehicle_does_not_know_is_refused() -> None:
-    wanted = wanting(COMPASS_MOT_X=5.0, COMPASS_MOT4_X=1.0)
-    with pytest.raises(WriteError, match="COMPASS_MOT4_X must exist on the vehicle"):
+    wanted = wanting(COMPASS_MOT_X=5.0, CAL_MAG0_XOFF=1.0)
+    with pytest.raises(WriteError, match="CAL_MAG0_XOFF must exist on the vehicle"):
         plan(HELD, wanted, QUAD)
 
 
@@ -186,6 +227,8 @@ def test_the_relevant_names_are_names_and_hold_what_is_wanted(autopilot: str) ->
     names = relevant_names(autopilot, wanting(COMPASS_PMOT1_X=1.0, ARMING_CHECK=1.0))
     assert "COMPASS_PMOT1_X" in names
     assert "ARMING_CHECK" not in names
+    rest = relevant_names(autopilot, wanting(ARMING_CHECK=1.0, STAT_RUNTIME=1.0), everything=True)
+    assert "ARMING_CHECK" in rest
     text = "".join(f"{name},0\n" for name in names)
     assert parse_parameters(text, "names").values == dict.fromkeys(names, 0.0)
 

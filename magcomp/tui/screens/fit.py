@@ -13,7 +13,7 @@ from textual.widgets import ProgressBar, Static
 
 from magcomp.analysis import Options
 from magcomp.fit import METHODS
-from magcomp.model import CURRENT, Analysis, Grade
+from magcomp.model import Analysis, Grade, quantity_of
 from magcomp.report import words
 from magcomp.tui.fits import fit_rows, time_range
 from magcomp.tui.messages import OptionsChosen, TimeRangeWanted
@@ -145,7 +145,7 @@ and C change method, regressor, time range and compasses, and fit again at once;
         self.query_one("#view-unexplained").border_subtitle = "x now   • corrected"
         axes = zip(AXIS_WORDS, shown.result.fit.interference, strict=True)
         each = "  ".join(f"{axis} {words.number(float(value))}" for axis, value in axes)
-        per = "per A" if shown.result.fit.regressor == CURRENT else "at full"
+        per = quantity_of(shown.result.fit.regressor).per
         self.query_one("#view-shift").border_subtitle = f"{each}  {per}"
 
     def _key(self, name: str) -> str:
