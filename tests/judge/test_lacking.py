@@ -54,7 +54,7 @@ def test_the_shares_of_the_motor_vector_grow_with_the_square_of_the_load(flown):
 def test_headings_never_seen_under_load_are_named(flown):
     found, samples = flown
     yaw = np.mod(np.degrees(samples.attitude[:, 2]), 360.0)
-    hard = samples.u > found.u_low + 0.6 * (found.u_high - found.u_low)
+    hard = samples.total > found.u_low + 0.6 * (found.u_high - found.u_low)
     away = samples.where(~(hard & (yaw > 200.0) & (yaw < 290.0)))
     text = said(unsure_of(found, MOTOR), away)
     assert text.startswith("headings 200° to 290° were never seen above")
@@ -63,7 +63,7 @@ def test_headings_never_seen_under_load_are_named(flown):
 
 def test_a_load_that_hardly_changed_is_named(flown):
     found, samples = flown
-    steady = samples.where(samples.u > 0.6 * found.u_high)
+    steady = samples.where(samples.total > 0.6 * found.u_high)
     assert said(unsure_of(found, MOTOR), steady).startswith("the motors only worked between")
 
 
