@@ -53,7 +53,7 @@ def level_matrix(roll: ArrayLike, pitch: ArrayLike) -> FloatArray:
         [
             np.stack([cos_pitch, sin_roll * sin_pitch, cos_roll * sin_pitch], axis=-1),
             np.stack([zero, cos_roll, -sin_roll], axis=-1),
-            np.stack([-sin_pitch, sin_roll * cos_pitch, cos_roll * cos_pitch], axis=-1),
+            gravity_direction(roll, pitch),
         ],
         axis=-2,
     )
@@ -67,7 +67,9 @@ def gravity_direction(roll: ArrayLike, pitch: ArrayLike) -> FloatArray:
     >>> gravity_direction(0.0, np.radians(30.0)).round(3).tolist()
     [-0.5, 0.0, 0.866]
     """
-    return level_matrix(roll, pitch)[..., 2, :]
+    roll, pitch = np.broadcast_arrays(np.asarray(roll, float), np.asarray(pitch, float))
+    cos_pitch = np.cos(pitch)
+    return np.stack([-np.sin(pitch), np.sin(roll) * cos_pitch, np.cos(roll) * cos_pitch], axis=-1)
 
 
 def body_from_earth(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> FloatArray:
@@ -155,3 +157,22 @@ def heading_shift(
     still = np.einsum("...ij,...j->...i", level, np.asarray(field, float))
     horizontal = still[..., 0] ** 2 + still[..., 1] ** 2
     return np.asarray((still[..., 1] * shift[..., 0] - still[..., 0] * shift[..., 1]) / horizontal)
+
+
+def apart(path: ArrayLike, other: ArrayLike) -> float:
+    """How far a path strays from another: the largest distance of its points from the other's.
+
+    Parameters
+    ----------
+    path, other
+        Points, any unit, shapes (n, k) and (m, k).
+
+    Examples
+    --------
+    >>> apart([[0.0, 0.0], [3.0, 5.0]], [[0.0, 0.0], [0.0, 1.0]])
+    5.0
+    """
+    from scipy.spatial import cKDTree  # noqa: PLC0415 -- slow to import, and seldom needed
+
+    nearest, _ = cKDTree(np.asarray(other, float)).query(np.asarray(path, float))
+    return float(np.max(nearest))

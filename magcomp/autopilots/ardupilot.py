@@ -39,7 +39,7 @@ from magcomp.autopilots.ardupilot_names import (
     vector_names,
 )
 from magcomp.autopilots.motor_test import ArduPilotMotorTest
-from magcomp.autopilots.protocol import (
+from magcomp.autopilots.terms import (
     FieldMeaning,
     Kind,
     LagPrior,
@@ -68,6 +68,7 @@ _CURVE_NAMES = ("MOT_THST_EXPO", "MOT_SPIN_MIN", "MOT_SPIN_MAX")
 _PWM_NAMES = ("MOT_PWM_MIN", "MOT_PWM_MAX")
 _TOLD_PER_READING = (Kind.OFFSET, Kind.MOTOR)
 
+_OTHER_COMPASSES = ("SCALED_IMU2", "SCALED_IMU3")
 _LINK = LagPriors(LagPrior(0.08, 0.1), LagPrior(0.08, 0.1))
 """A reading is the mean over one update of 0.1 s, and waits for the stream that sends it."""
 
@@ -136,6 +137,10 @@ class ArduPilot:
         recording flight_wrong_mot shows it).
         """
         return FieldMeaning(truncated=True, applied_later_s=0.05)
+
+    def compass_messages(self, values: Mapping[str, float]) -> Mapping[int, str]:  # noqa: ARG002
+        """Each message carries the compass of its number, by priority."""
+        return dict(enumerate((self.first_compass_message, *_OTHER_COMPASSES), start=1))
 
     def from_telemetry(
         self,
@@ -309,10 +314,10 @@ class ArduPilot:
         return tuple(ardupilot_settings.warnings(values))
 
     def write_warnings(
-        self, asked: Mapping[str, float], values: Mapping[str, float]
+        self, asked: Mapping[str, float], held: Mapping[str, float]
     ) -> tuple[str, ...]:
         """Of vectors without their switch."""
-        return tuple(ardupilot_settings.write_warnings(asked, values))
+        return tuple(ardupilot_settings.write_warnings(asked, held))
 
     def multiplied(self, vehicle: Vehicle) -> tuple[str, ...]:
         """The current; in copters and subs, which hand it to the compass, the throttle too."""
@@ -322,6 +327,10 @@ class ArduPilot:
         """A bit of LOG_BITMASK for its own log, a message for telemetry."""
         asked = _LOG_BITS if source_format == "dataflash" else _LINK_MESSAGES
         return asked[quantity]
+
+    def link_notes(self, compasses: int) -> tuple[str, ...]:  # noqa: ARG002
+        """None: each message says whose it is."""
+        return ()
 
     def reading_notes(self, recording: Recording) -> tuple[str, ...]:  # noqa: ARG002
         """None: the messages say what they are."""

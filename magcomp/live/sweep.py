@@ -7,6 +7,7 @@ before it returns or raises; what cannot be told, the autopilot's own time-out e
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
 from magcomp import autopilots
 from magcomp.errors import (
@@ -18,10 +19,14 @@ from magcomp.errors import (
     VehicleRefusedError,
 )
 from magcomp.link import DEFAULT_RATES
+from magcomp.link.clock import Clock
+from magcomp.live.latest import Latest
+from magcomp.live.session import LiveSession
 from magcomp.model import Recording, Vehicle
 from magcomp.sweeping.events import Event, Outcome, Reason
 from magcomp.sweeping.messages import decode, encode
 from magcomp.sweeping.protocol import SweepSequence
+from magcomp.sweeping.steps import GENTLE, require_possible
 from magcomp.writing.messages import Peer
 from magcomp.writing.writer import Connection
 
@@ -35,6 +40,83 @@ _UNREACHED = {Reason.LINK_LOST: LinkError, Reason.UNANSWERED: LinkTimeoutError}
 
 def _silent(_: object) -> None:
     pass
+
+
+@dataclass(frozen=True)
+class Bench:
+    """A vehicle whose motors can be spun, and how far.
+
+    Attributes
+    ----------
+    vehicle
+        Which.
+    motors
+        How many it has.
+    most
+        Share of the outputs' range of the strongest step.
+    """
+
+    vehicle: Vehicle
+    motors: int
+    most: float
+
+    @property
+    def name(self) -> str:
+        """What has to be typed before anything spins, such as ``copter-1``."""
+        return name_of(self.vehicle)
+
+    @property
+    def gentle(self) -> float:
+        """Share of the first steps."""
+        return GENTLE * self.most
+
+    def is_name(self, typed: str) -> bool:
+        """Whether what was typed is the vehicle's name."""
+        return self.machine(0.0).confirm(typed)
+
+    def machine(self, now: float) -> SweepSequence:
+        """A machine for its sweep."""
+        motor_test = autopilots.of(self.vehicle).motor_test
+        return SweepSequence(self.name, motor_test, self.motors, self.most, now=now)
+
+
+def make_ready(session: LiveSession, motors: int | None, most: float) -> Bench:
+    """Look whether a vehicle can be swept.
+
+    Parameters
+    ----------
+    session
+        With the vehicle, whose calibration is read.
+    motors
+        How many it has; None to ask its parameters.
+    most
+        Share of the outputs' range of the strongest step.
+
+    Raises
+    ------
+    UsageError
+        It is no multirotor, or a number is out of bounds.
+    VehicleRefusedError
+        It is armed.
+    MissingDataError
+        It has no current sensor, or does not tell how many motors it has.
+    """
+    # Alone, so that nobody is still reading which outputs drive motors.
+    vehicle, now = session.alone(lambda _link, vehicle, latest, _: (vehicle, latest.now(vehicle)))
+    if vehicle.kind != "copter":
+        raise UsageError(f"A sweep's vehicle must be a multirotor; instead it is a {vehicle.kind}")
+    if now.armed:
+        raise VehicleRefusedError(
+            "The vehicle must be disarmed and on the ground for a sweep; instead it is armed"
+        )
+    if now.current is None:
+        hint = autopilots.of(vehicle).how_to_record("current", "tlog")
+        raise MissingDataError(
+            f"A sweep's vehicle must tell its battery's current; instead it tells none: {hint}"
+        )
+    count = motor_count(session.recording()) if motors is None else motors
+    require_possible(count, most)
+    return Bench(vehicle, count, most)
 
 
 def name_of(vehicle: Vehicle) -> str:
@@ -63,16 +145,36 @@ def motor_count(recording: Recording) -> int:
     return sum(bool(outputs.value[:, channel].any()) for channel in motors.channels)
 
 
-def require_sweepable(vehicle: Vehicle) -> None:
-    """Refuse a vehicle whose motors magcomp does not spin.
+def sweep(
+    session: LiveSession,
+    bench: Bench,
+    typed: str,
+    pressed: Callable[[], Reason | None],
+    on_event: Callable[[Event], None] = _silent,
+) -> Outcome:
+    """Spin a vehicle's motors step by step; see :func:`carry_out`.
 
-    Raises
-    ------
-    UsageError
-        It is no multirotor.
+    Parameters
+    ----------
+    session
+        With the vehicle.
+    bench
+        From :func:`make_ready`.
+    typed
+        The vehicle's name, by which somebody says that nothing can come to harm.
+    pressed
+        Asked all the time whether somebody wants it to stop, and why.
+    on_event
+        Told everything as it happens.
     """
-    if vehicle.kind != "copter":
-        raise UsageError(f"A sweep's vehicle must be a multirotor; instead it is a {vehicle.kind}")
+
+    def work(link: Connection, vehicle: Vehicle, _: Latest, clock: Clock) -> Outcome:
+        now = clock.monotonic
+        machine = bench.machine(now())
+        machine.confirm(typed)
+        return carry_out(machine, link, vehicle, clock=now, pressed=pressed, on_event=on_event)
+
+    return session.alone(work)
 
 
 def carry_out(

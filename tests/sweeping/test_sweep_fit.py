@@ -6,7 +6,7 @@ import struct
 
 import numpy as np
 import pytest
-from bench import LIMITS, RATES, Bench
+from sweep_bench import LIMITS, RATES, Bench
 
 from magcomp.analysis import Options, analyse
 from magcomp.simulate.ground import Asker

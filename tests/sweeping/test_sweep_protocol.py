@@ -6,10 +6,10 @@ import math
 from dataclasses import dataclass, field
 
 import pytest
-from bench import KNOWN, MOTOR_TEST
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
+from sweep_bench import KNOWN, MOTOR_TEST
 
 from magcomp import autopilots
 from magcomp.autopilots.motor_test import Command, MotorTest

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bench import LIMITS, MID_STEP_S, WARM_UP_S, Befallen, Bench, Once
+from sweep_bench import LIMITS, MID_STEP_S, WARM_UP_S, Befallen, Bench, Once
 
 from magcomp.errors import LinkError, LinkTimeoutError, VehicleRefusedError
 from magcomp.live.sweep import raise_for_failure
@@ -116,7 +116,7 @@ def test_a_vehicle_that_no_longer_hears_stops_by_itself():
 def test_a_lost_heartbeat_stops_though_the_rest_still_comes():
     bench = Bench()
     heard = bench.machine.handle
-    lost = Once(lambda _: None)
+    lost = Once(lambda _: None, not_before=WARM_UP_S + 1.1)
 
     def without_heartbeats(message, now):
         if lost.at is None or type(message).__name__ != "Heartbeat":
@@ -125,6 +125,7 @@ def test_a_lost_heartbeat_stops_though_the_rest_still_comes():
     bench.machine.handle = without_heartbeats
     outcome = bench.sweep(lost)
     assert outcome.reason is Reason.LINK_LOST
+    assert "no heartbeat came for 2.5 s" in outcome.why
     assert run_on_s(bench, lost.at) < LIMITS.heartbeat_s + AT_ONCE_S
 
 

@@ -184,14 +184,16 @@ class Bench:
 
 
 class Once:
-    """Does something once, in the middle of the first step."""
+    """Does something once, in the middle of the first step unless told otherwise."""
 
-    def __init__(self, does: Callable[[Bench], Reason | None]) -> None:
-        self._does = does
+    def __init__(
+        self, does: Callable[[Bench], Reason | None], not_before: float = MID_STEP_S
+    ) -> None:
+        self._does, self._not_before = does, not_before
         self.at: float | None = None
 
     def __call__(self, bench: Bench) -> Reason | None:
-        if self.at is not None or bench.now < MID_STEP_S:
+        if self.at is not None or bench.now < self._not_before:
             return None
         assert bench.vehicle.spinning, "it must befall while a motor spins"
         self.at = bench.now
