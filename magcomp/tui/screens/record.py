@@ -32,11 +32,14 @@ class RecordScreen(StepScreen):
     HELP = """\
 **Recording.** Everything the vehicle says is written to the file as it arrives. Do what the *next*
 line says; it speaks of throttle only while the vehicle is held or tied down. When it says that it
-is enough, press N. You can fit at any time and come back: the recording goes on.
+is enough, press N. G sweeps a vehicle that stands on the ground: its motors spin, one by one and
+together, once you have typed its name. You can fit at any time and come back: the recording goes
+on.
 """
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("n", "app.forward", "Fit", id="go.next"),
         Binding("b", "app.backward", "Back", id="go.back"),
+        Binding("g", "app.sweep", "Sweep", id="record.sweep"),
         Binding("x", "app.disconnect", "Disconnect", id="connect.close"),
     ]
 
