@@ -9,25 +9,14 @@ from collections.abc import Mapping
 from functools import cache
 from importlib.resources import files
 
-from markupsafe import Markup
-
 from magcomp.report.figure import Figure
-from magcomp.report.html_parts import figure, templates
-
-ASSETS = files("magcomp.report") / "assets"
+from magcomp.report.html_parts import templates
 
 
-def canvas(name: str, picture: Figure) -> Markup:
-    """Where a picture is drawn, with its title and caption.
-
-    Parameters
-    ----------
-    name
-        Unique on the page, and the figure's name in :func:`page`.
-    picture
-        The picture.
-    """
-    return figure(name, picture)
+@cache
+def asset(name: str) -> str:
+    """The style or the script of every page."""
+    return (files("magcomp.report") / "assets" / name).read_text(encoding="utf-8")
 
 
 def page(title: str, body: str, source: str, pictures: Mapping[str, Figure]) -> str:
@@ -38,15 +27,12 @@ def page(title: str, body: str, source: str, pictures: Mapping[str, Figure]) -> 
     title
         Of the window.
     body
-        HTML, with a :func:`canvas` for each picture.
+        HTML, with the template's ``figure`` for each picture.
     source
         The JSON document whose numbers the page shows.
     pictures
         By the name of their canvas.
     """
-    style, script = (
-        (ASSETS / name).read_text(encoding="utf-8") for name in ("report.css", "report.js")
-    )
     drawn = {
         name: {"data": each.data, "layout": each.layout, "play": each.play}
         for name, each in pictures.items()
@@ -56,8 +42,8 @@ def page(title: str, body: str, source: str, pictures: Mapping[str, Figure]) -> 
         .get_template("page.html.j2")
         .render(
             title=title,
-            style=style,
-            script=script,
+            style=asset("report.css"),
+            script=asset("report.js"),
             body=body,
             source=_inert(source),
             figures=_inert(json.dumps(drawn, separators=(",", ":"), allow_nan=False)),

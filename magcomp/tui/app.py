@@ -169,6 +169,7 @@ class MagcompApp(BaseApp):
             "disconnect": bool(work.source),
             "open_log": not work.source,
             "simulate": not work.source,
+            "manoeuvre": work.live,
             "write": work.live,
             "sweep": work.live,
             "fly_again": self.simulation is not None and bool(self.writing.in_force),
@@ -189,6 +190,10 @@ class MagcompApp(BaseApp):
     def action_disconnect(self) -> None:
         """Close vehicle or log."""
         opening.leave(self)
+
+    def action_manoeuvre(self) -> None:
+        """Say how the vehicle is moved, or let it be found out."""
+        opening.next_manoeuvre(self)
 
     def action_fit(self) -> None:
         """Fit what is recorded so far."""
@@ -274,6 +279,9 @@ class MagcompApp(BaseApp):
             yield SystemCommand(
                 f"Go to {title}", "Step of the road", lambda s=step: self.action_go(s)
             )
+        yield SystemCommand(
+            "How it is moved", "Flown, on a stand, tied down", self.action_manoeuvre
+        )
         yield SystemCommand("Fit again", "What is recorded so far", self.action_fit)
         yield SystemCommand("Sweep on the ground", "The motors spin", self.action_sweep)
         yield SystemCommand("Write to vehicle", "After a question", self.action_write)

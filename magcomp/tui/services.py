@@ -15,6 +15,7 @@ from magcomp.errors import LinkError, MagcompError, UsageError
 from magcomp.link import Connection, SerialPort, serial_ports
 from magcomp.link.clock import Clock
 from magcomp.live.latest import Latest
+from magcomp.live.situation import Manoeuvre
 from magcomp.live.snapshot import LiveSnapshot
 from magcomp.live.sweep import Bench, make_ready, sweep
 from magcomp.live.upload import new_file
@@ -45,7 +46,15 @@ _SERVE_S = 10.0
 
 
 class Session(Protocol):
-    """What the screens need of a live vehicle; `LiveSession` has it."""
+    """What the screens need of a live vehicle; `LiveSession` has it.
+
+    Attributes
+    ----------
+    manoeuvre
+        What the user says that is being done, None to find out; may be set at any time.
+    """
+
+    manoeuvre: Manoeuvre | None
 
     def snapshot(self) -> LiveSnapshot:
         """Everything a screen shows, now; cheap."""

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from browser_checks import DRAWN, assert_clean, axe_findings, clipped_labels, prefer, show
 from chromium import Page, chromium_page, find_chromium
 from report_analyses import refused, still
 
@@ -20,9 +21,6 @@ pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(find_chromium() is None, reason="no Chromium on this machine"),
 ]
-
-LOCAL = ("file:", "data:", "blob:")
-DRAWN = "document.documentElement?.dataset.drawn"
 
 
 @pytest.fixture(scope="module")
@@ -46,36 +44,6 @@ def bad(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("bad") / "report.html"
     path.write_text(html(made.recording, made.analysis, options=made.options), encoding="utf-8")
     return path
-
-
-def prefer(browser: Page, scheme: str) -> None:
-    features = [{"name": "prefers-color-scheme", "value": scheme}]
-    browser.call("Emulation.setEmulatedMedia", features=features)
-
-
-def show(browser: Page, path: Path, width: int = 1280) -> None:
-    browser.call(
-        "Emulation.setDeviceMetricsOverride",
-        width=width,
-        height=900,
-        deviceScaleFactor=1,
-        mobile=width < 500,
-    )
-    browser.call("Emulation.setTouchEmulationEnabled", enabled=width < 500)
-    prefer(browser, "light")
-    browser.open(path)
-    browser.wait_for(DRAWN)
-
-
-def assert_clean(browser: Page, path: Path) -> None:
-    """Every picture is drawn; nothing complained; nothing was asked for from elsewhere."""
-    canvases = browser.evaluate("document.querySelectorAll('.canvas').length")
-    assert canvases > 0
-    assert browser.evaluate(f"Number({DRAWN})") == canvases
-    assert browser.complaints() == []
-    requests = browser.requests()
-    assert path.resolve().as_uri() in requests
-    assert [url for url in requests if not url.startswith(LOCAL)] == []
 
 
 @pytest.fixture(scope="module")
@@ -193,30 +161,14 @@ def test_a_phone_shows_a_rejected_fit_without_scrolling_sideways(browser: Page, 
     assert browser.evaluate("document.documentElement.scrollWidth") <= 390
 
 
-AXE = """axe.run(document, { resultTypes: ["violations"] }).then(({ violations }) =>
-  violations.map(({ impact, id, nodes }) => `${impact}: ${id}: ${nodes.map((n) => n.target)}`))"""
-
-
 @pytest.mark.parametrize(("which", "width"), [("good", 1280), ("bad", 390)])
 def test_axe_finds_nothing(
     browser: Page, which: str, width: int, request: pytest.FixtureRequest
 ) -> None:
-    axe = Path(pytest.importorskip("axe_core_python").__file__).with_name("axe.min.js")
+    show(browser, request.getfixturevalue(which), width)
     for scheme in ("light", "dark"):
-        show(browser, request.getfixturevalue(which), width)
         prefer(browser, scheme)
-        browser.evaluate(axe.read_text(encoding="utf-8") + ";0")
-        assert browser.evaluate(AXE) == []
-
-
-CLIPPED = """[...document.querySelectorAll(".canvas")].flatMap((canvas) => {
-  const frame = canvas.getBoundingClientRect();
-  return [...canvas.querySelectorAll("svg text")].filter((text) => {
-    const box = text.getBoundingClientRect();
-    return box.width && (box.left < frame.left - 1 || box.right > frame.right + 1
-      || box.top < frame.top - 1 || box.bottom > frame.bottom + 1);
-  }).map((text) => `${canvas.id}: ${text.textContent}`);
-})"""
+        assert axe_findings(browser) == []
 
 
 @pytest.mark.parametrize("which", ["good", "bad"])
@@ -225,7 +177,7 @@ def test_no_label_is_cut(
     browser: Page, which: str, width: int, request: pytest.FixtureRequest
 ) -> None:
     show(browser, request.getfixturevalue(which), width)
-    assert browser.evaluate(CLIPPED) == []
+    assert clipped_labels(browser) == []
 
 
 def test_the_check_would_notice_an_error_and_a_request(browser: Page, tmp_path: Path) -> None:
