@@ -17,8 +17,10 @@ from magcomp.tui.messages import SweepTold
 from magcomp.tui.screens.dialogs import AskText, Fault, Message
 from magcomp.tui.screens.sweeping import Sweeping
 
+DEAF_S = 2.0
+"""A screen that draws nothing for so long takes no key either: the sweep stops."""
+
 _DEFAULT_MOST = 0.5
-_DEAF_S = 2.0
 _WARNING = """\
 The motors will spin, each alone and all together. Take the propellers off, or hold the vehicle down
 so that it cannot move or tilt. Any key stops at once.\
@@ -76,9 +78,8 @@ def _begin(app: BaseApp, bench: Bench, answer: tuple[str, ...]) -> None:
     def pressed() -> Reason | None:
         if app.stopping.is_set() or not app.is_running:
             return Reason.INTERRUPTED
-        if screen.silent_s > _DEAF_S:
-            # A screen that draws no more takes no key either.
-            return Reason.ERROR
+        if screen.silent_s > DEAF_S:
+            return Reason.DEAF
         return Reason.KEY if screen.stop.is_set() else None
 
     def tell(event: Event) -> None:
