@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 
-.PHONY: demo test test-all coverage check lint lock benchmark docs pictures clean
+.PHONY: demo test test-all coverage check lint lock benchmark docs pictures release clean
 
 demo: $(VENV)/installed
 	@$(BIN)/magcomp demo
@@ -28,7 +28,7 @@ check: lint
 
 # Needs uv. The lock is what hosted CI installs; `make test` takes what pyproject.toml allows.
 lock:
-	@uv pip compile pyproject.toml --extra dev --extra fleet --extra docs --universal --python-version 3.11 --generate-hashes \
+	@uv pip compile pyproject.toml --extra dev --extra fleet --extra docs --extra release --universal --python-version 3.11 --generate-hashes \
 	  --no-annotate --quiet -o requirements-dev.lock
 
 benchmark: $(VENV)/installed-dev
@@ -43,6 +43,17 @@ docs: $(VENV)/installed
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[docs]'
 	@$(BIN)/python -m sphinx -E -W --keep-going -q -b html docs build/docs
 	@echo "build/docs/index.html"
+
+# Wheel, sdist, and what the wheel brings along (CycloneDX), into dist/.
+release: $(VENV)/installed
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[release]'
+	@rm -rf dist build/fresh
+	@$(BIN)/python -m build --outdir dist .
+	@$(PYTHON) -m venv build/fresh
+	@build/fresh/bin/python -m pip install --quiet --disable-pip-version-check dist/magcomp-*.whl
+	@$(BIN)/cyclonedx-py environment --pyproject pyproject.toml --output-reproducible \
+	  -o dist/magcomp.cdx.json build/fresh/bin/python
+	@ls dist
 
 # Every picture of README.md and docs/ that shows what the program prints or draws; a vehicle flies.
 pictures: $(VENV)/installed

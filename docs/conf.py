@@ -21,6 +21,7 @@ exclude_patterns = ["*.py"]
 html_theme = "furo"
 html_title = f"magcomp {__version__}"
 html_copy_source = False
+html_extra_path = ["schema"]
 
 myst_heading_anchors = 3
 autodoc_member_order = "bysource"

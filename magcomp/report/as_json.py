@@ -1,7 +1,7 @@
 """An analysis as one JSON object: the form that scripts rely on.
 
-Keys are added, never renamed. A number that does not exist is null; NaN and infinity never
-appear.
+Keys are added, never renamed; docs/schema/ names them all. A number that does not exist is null;
+NaN and infinity never appear.
 """
 
 from __future__ import annotations
@@ -79,10 +79,15 @@ def dumps(document: Mapping[str, Any]) -> str:
     return json.dumps(_finite(document), indent=2, allow_nan=False) + "\n"
 
 
+SCHEMA = 1
+"""Of docs/schema/: grows only when a key goes or changes its meaning."""
+
+
 def head(source: str, duration_s: float, vehicle: Vehicle) -> dict[str, Any]:
     """What every object of a log begins with."""
     return {
         "magcomp": __version__,
+        "schema": SCHEMA,
         "source": source,
         "duration_s": round(duration_s, 3),
         "vehicle": {
