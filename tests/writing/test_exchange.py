@@ -10,7 +10,7 @@ from magcomp.writing.messages import Pong
 
 TIMING = Timing()
 RECEIVE_QUEUE = 20
-"""Read requests that ArduPilot holds; it drops the rest (docs/autopilots.md, ArduPilot: parameters)."""
+"""Reads that ArduPilot holds; it drops the rest (docs/autopilots.md, ArduPilot: parameters)."""
 
 
 def test_no_more_questions_wait_than_the_autopilot_holds():
