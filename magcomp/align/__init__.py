@@ -3,7 +3,8 @@
 from magcomp.align.control import controls, reported
 from magcomp.align.expected import expected_earth, has_position
 from magcomp.align.readings import readings, thinned, within
-from magcomp.align.sample import interpolate, sample
+from magcomp.align.sample import sample
+from magcomp.model import interpolate
 
 __all__ = [
     "controls",

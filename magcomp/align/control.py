@@ -16,7 +16,6 @@ import numpy as np
 
 from magcomp import autopilots
 from magcomp.align.low_pass import low_pass
-from magcomp.align.sample import interpolate
 from magcomp.autopilots.terms import MotorOutputs
 from magcomp.model import (
     CURRENT,
@@ -26,6 +25,7 @@ from magcomp.model import (
     FloatArray,
     Recording,
     Series,
+    interpolate,
 )
 
 _SHIFTS = np.arange(-0.2, 0.301, 0.02)

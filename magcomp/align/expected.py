@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from magcomp import autopilots
-from magcomp.align.sample import interpolate
 from magcomp.earth import EarthField, expected_field
 from magcomp.errors import MissingDataError
 from magcomp.geometry import gravity_direction
-from magcomp.model import Recording
+from magcomp.model import Recording, interpolate
 
 
 def expected_earth(recording: Recording) -> EarthField:

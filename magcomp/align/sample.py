@@ -8,7 +8,7 @@ import numpy as np
 
 from magcomp.errors import MissingDataError
 from magcomp.geometry import gravity_direction
-from magcomp.model import Control, FloatArray, Lags, Readings, Samples, Series
+from magcomp.model import Control, FloatArray, Lags, Readings, Samples, Series, interpolate
 
 _RATE_STEP_S = 0.05
 
@@ -63,19 +63,6 @@ def sample(
         u=_columns(interpolate(control.series, commanded)),
         u_rate=_columns(_rate(control.series, commanded)),
     )
-
-
-def interpolate(series: Series, time: FloatArray) -> FloatArray:
-    """A series at other times, linearly; shape (n,) or (n, k).
-
-    Examples
-    --------
-    >>> interpolate(Series(np.array([0.0, 1.0]), np.array([10.0, 20.0])), np.array([0.25])).tolist()
-    [12.5]
-    """
-    if series.value.ndim == 1:
-        return np.asarray(np.interp(time, series.time, series.value))
-    return np.stack([np.interp(time, series.time, column) for column in series.value.T], axis=1)
 
 
 def _columns(values: FloatArray) -> FloatArray:

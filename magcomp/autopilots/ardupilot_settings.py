@@ -23,6 +23,7 @@ from magcomp.autopilots.ardupilot_names import (
     single_name,
     vector_names,
 )
+from magcomp.autopilots.soundness import unsound
 from magcomp.autopilots.terms import Kind
 from magcomp.errors import InputError, MissingDataError
 from magcomp.model import Compass, ParameterHistory
@@ -65,19 +66,13 @@ def left_out(parameters: ParameterHistory) -> dict[int, InputError]:
     COMPASS_PMOT_EN overrides COMPASS_MOTCT for compass 1 (docs/autopilots.md,
     ArduPilot: control quantity).
     """
-    found: dict[int, InputError] = {}
-    for number in NUMBERS:
-        names = (*acting_on(number), COMPENSATION_SWITCH)
-        bad = {
-            name: change.value
-            for name in names
-            for change in parameters.of(name)
-            if not math.isfinite(change.value)
-        }
-        if bad:
-            found[number] = not_finite(bad)
-        elif (error := not_undoable(parameters, number)) is not None:
-            found[number] = error
+    found = unsound(
+        parameters,
+        {number: (*acting_on(number), COMPENSATION_SWITCH) for number in NUMBERS},
+        is_sound=lambda _, value: math.isfinite(value),
+        not_sound=not_finite,
+        not_usable=lambda number: not_undoable(parameters, number),
+    )
     if parameters.last(PER_MOTOR_SWITCH, 0.0):
         found[1] = MissingDataError(
             f"{PER_MOTOR_SWITCH} must be 0 while compass 1 is recorded; instead it is on, and a "

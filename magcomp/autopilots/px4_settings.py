@@ -23,6 +23,7 @@ from magcomp.autopilots.px4_names import (
 )
 from magcomp.autopilots.px4_rotation import ROTATIONS, rotation_number
 from magcomp.autopilots.px4_taking_over import sentences
+from magcomp.autopilots.soundness import unsound
 from magcomp.autopilots.terms import Kind
 from magcomp.errors import InputError, MissingDataError, ParameterFileError
 from magcomp.model import Compass, ParameterHistory
@@ -65,32 +66,32 @@ def slot_of(values: Mapping[str, float], device: int) -> int | None:
 
 def left_out(parameters: ParameterHistory) -> dict[int, InputError]:
     """Compasses that cannot be fitted or written, with the error that says so."""
-    found: dict[int, InputError] = {}
     values = parameters.latest
     slots = {compass.slot for compass in compasses(values)}
-    for number in NUMBERS:
-        names = (*acting_on(number), COMPENSATION_SWITCH)
-        bad = {
-            name: change.value
-            for name in names
-            for change in parameters.of(name)
-            if not abs(change.value) < _MOST[name == COMPENSATION_SWITCH]  # NaN fails
-        }
-        if bad:
-            found[number] = _not_sound(bad)
-        elif number not in slots:
-            found[number] = MissingDataError(
+
+    def not_usable(number: int) -> InputError | None:
+        if number not in slots:
+            return MissingDataError(
                 f"compass {number} must have a calibration slot of its own; instead "
                 f"{single_name('ID', number)} is 0: calibrate the compasses once with the ground "
                 "station and record again"
             )
-        elif np.linalg.eigvalsh(stored(values, number).soft_iron).min() < _FLATTEST:
-            found[number] = ParameterFileError(
+        if np.linalg.eigvalsh(stored(values, number).soft_iron).min() < _FLATTEST:
+            return ParameterFileError(
                 f"SCALE and ODIAG of CAL_MAG{number - 1} must make a soft iron that can be undone; "
                 "instead theirs flattens a direction or turns it around: calibrate the compass "
                 "anew and record again"
             )
-    return found
+        return None
+
+    return unsound(
+        parameters,
+        {number: (*acting_on(number), COMPENSATION_SWITCH) for number in NUMBERS},
+        # A NaN is below nothing.
+        is_sound=lambda name, value: abs(value) < _MOST[name == COMPENSATION_SWITCH],
+        not_sound=_not_sound,
+        not_usable=not_usable,
+    )
 
 
 def _not_sound(values: Mapping[str, float]) -> ParameterFileError:

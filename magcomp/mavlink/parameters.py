@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from magcomp import autopilots
 from magcomp.mavlink.messages import Message, decode_payload, text
+from magcomp.model import as_floats
 
 REAL32 = 9
 """MAV_PARAM_TYPE_REAL32."""
@@ -96,9 +97,7 @@ def decode_values(field: NDArray[Any], types: NDArray[Any], how: Encoding) -> ND
     how
         As the vehicle encodes.
     """
-    # A signalling NaN becomes a quiet one, and no warning.
-    with np.errstate(invalid="ignore"):
-        values: NDArray[np.float64] = field.astype(np.float64)
+    values = as_floats(field)
     if how is Encoding.CAST:
         return values
     octets = np.ascontiguousarray(field).view(np.uint8).reshape(-1, _FIELD)

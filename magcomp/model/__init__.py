@@ -22,6 +22,7 @@ from magcomp.model.fit import (
     symmetric,
     unpack,
 )
+from magcomp.model.numbers import as_floats
 from magcomp.model.parameters import ParameterSet
 from magcomp.model.quantity import CURRENT, QUANTITIES, THROTTLE, Quantity, quantity_of, unit_of
 from magcomp.model.recording import (
@@ -38,6 +39,7 @@ from magcomp.model.recording import (
     Series,
     Vehicle,
     compasses_of,
+    interpolate,
 )
 from magcomp.model.samples import (
     Control,
@@ -86,7 +88,9 @@ __all__ = [
     "Series",
     "Vehicle",
     "Verdict",
+    "as_floats",
     "compasses_of",
+    "interpolate",
     "pack",
     "quantity_of",
     "symmetric",

@@ -44,6 +44,19 @@ class Series:
         return len(self.time)
 
 
+def interpolate(series: Series, time: FloatArray) -> FloatArray:
+    """A series at other times, linearly; shape (n,) or (n, k).
+
+    Examples
+    --------
+    >>> interpolate(Series(np.array([0.0, 1.0]), np.array([10.0, 20.0])), np.array([0.25])).tolist()
+    [12.5]
+    """
+    if series.value.ndim == 1:
+        return np.asarray(np.interp(time, series.time, series.value))
+    return np.stack([np.interp(time, series.time, column) for column in series.value.T], axis=1)
+
+
 @dataclass(frozen=True)
 class Compass:
     """A compass of a vehicle, as its parameters describe it.

@@ -12,7 +12,7 @@ from magcomp.autopilots.px4 import Px4
 from magcomp.autopilots.px4_correction import MGAUSS
 from magcomp.autopilots.px4_rotation import sensor_to_body
 from magcomp.autopilots.px4_settings import NUMBERS, compasses, slot_of
-from magcomp.model import FloatArray, ParameterHistory, Series
+from magcomp.model import FloatArray, ParameterHistory, Series, interpolate
 from magcomp.sources.ulog_file import Topic, UlogFile
 
 _OFTEN = 1.5
@@ -103,9 +103,7 @@ class Compasses:
         if np.count_nonzero(common) < _LEAST_COMMON:
             return False
         own = Series(own.time[common], own.value[common])
-        told = np.stack(
-            [np.interp(own.time, corrected.time, axis) for axis in corrected.value.T], axis=1
-        )
+        told = interpolate(corrected, own.time)
         apart = present.correction.apply(own.value, np.zeros(len(own))) - told
         middle = np.median(apart, axis=0)
         spread = 1.4826 * np.median(np.abs(apart - middle), axis=0)

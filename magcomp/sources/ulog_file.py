@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from magcomp.model import FloatArray
+from magcomp.model import FloatArray, as_floats
 from magcomp.sources.ulog_walk import Subscription, Walked, walk
 
 Columns = Mapping[str, NDArray[Any]]
@@ -64,9 +64,7 @@ class Topic:
 
     def number(self, name: str) -> FloatArray:
         """A field as float64, shape (n,)."""
-        # A signalling NaN becomes a quiet one, and no warning.
-        with np.errstate(invalid="ignore"):
-            return np.asarray(self.columns[name], dtype=np.float64)
+        return as_floats(self.columns[name])
 
     def vector(self, name: str, size: int) -> FloatArray:
         """The first fields of an array side by side, shape (n, size)."""
@@ -269,8 +267,7 @@ def _topics(
     for key, tables in parts.items():
         alike = [each for each in tables if each.dtype == tables[0].dtype]
         table = alike[0] if len(alike) == 1 else np.concatenate(alike)
-        with np.errstate(invalid="ignore"):
-            since = table["timestamp"].astype(np.float64) - start
+        since = as_floats(table["timestamp"]) - start
         rows = np.flatnonzero((since > -_BEFORE_US) & (since < _DAY_US))
         rows = rows[np.argsort(since[rows], kind="stable")]
         if len(rows):

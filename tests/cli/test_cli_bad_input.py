@@ -25,6 +25,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from magcomp.cli.app import run
 from magcomp.cli.places import where_logs_are
+from magcomp.sources import read
 
 SINGLE = ("--compass", "1", "--regressor", "current")
 """The least work a fit can be."""
@@ -154,8 +155,14 @@ def test_a_log_cut_at_any_byte_of_its_last_two_frames_is_fitted(
     end = min(late, key=lambda n: len(sound[n - 1]) + len(sound[n]))
     data = b"".join(sound[: end + 1])
     log = tmp_path / "cut.tlog"
-    for size in range(len(data) - len(sound[end - 1]) - len(sound[end]), len(data)):
+    first = len(data) - len(sound[end - 1]) - len(sound[end])
+    whole = first + len(sound[end - 1])
+    for size in range(first, len(data)):
         log.write_bytes(data[:size])
+        recording = read(log)
+        assert recording.report.frames == end - (size < whole)
+        if (size - first) % 9:
+            continue
         assert run(["fit", str(log), "--json", *SINGLE]) == 0, size
         captured = capsys.readouterr()
         assert captured.err == ""

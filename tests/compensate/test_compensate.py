@@ -107,7 +107,7 @@ def test_what_is_not_finite_gives_no_heading(bad, place):
     assert np.isnan(headings[0])
 
 
-def test_a_million_readings_leave_nothing_behind():
+def test_a_hundred_thousand_readings_leave_nothing_behind():
     compensator = Compensator(CORRECTION, DECLINATION)
     reading = [130.0, -20.0, 410.0]
     for _ in range(1000):
@@ -116,7 +116,7 @@ def test_a_million_readings_leave_nothing_behind():
     try:
         before, _ = tracemalloc.get_traced_memory()
         tracemalloc.reset_peak()
-        for _ in range(1_000_000):
+        for _ in range(100_000):
             compensator.correct(reading, 12.0, 0.1, -0.2)
         after, peak = tracemalloc.get_traced_memory()
     finally:

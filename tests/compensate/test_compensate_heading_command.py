@@ -23,12 +23,11 @@ def document(capsys, *arguments):
     return json.loads(capsys.readouterr().out)
 
 
-@pytest.fixture
-def parameters(tmp_path, capsys):
+@pytest.fixture(scope="module")
+def parameters(tmp_path_factory):
     """The parameter file of the flight's own fit."""
-    path = tmp_path / "compass.param"
-    assert run(["fit", FLIGHT, "-o", str(path)]) == 0
-    capsys.readouterr()
+    path = tmp_path_factory.mktemp("fitted") / "compass.param"
+    assert run(["fit", FLIGHT, "--compass", "1", "-o", str(path)]) == 0
     return str(path)
 
 

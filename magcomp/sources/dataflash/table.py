@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from magcomp.model import FloatArray
+from magcomp.model import FloatArray, as_floats
 
 Columns = Mapping[str, NDArray[Any]]
 
@@ -66,9 +66,7 @@ class Piece:
         if stored is None or stored.dtype.kind not in "biuf":
             return np.full(len(self.place), np.nan)
         scale = 1.0 if self.scaled else _SCALES.get(self.kind(column), 1.0)
-        # A signalling NaN becomes a quiet one, and no warning.
-        with np.errstate(invalid="ignore"):
-            number = stored.astype(np.float64)
+        number = as_floats(stored)
         return number if scale == 1.0 else number * scale
 
 
