@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from link_vehicle import FakeVehicle
+from link_vehicle import DEVICE_IDS, FakeVehicle
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from magcomp.compensate import Reading
@@ -28,12 +28,12 @@ def field(ms: int) -> mavlink.MAVLink_message:
 
 
 def readings(regressor: str, *messages: mavlink.MAVLink_message) -> list[Reading]:
-    sender, sensors = FakeVehicle(), Sensors(1)
+    sender, sensors = FakeVehicle(), Sensors(1, VEHICLE, DEVICE_IDS)
     sent = [mavlink.MAVLink_attitude_message(1, 0, 0, 0, 0, 0, 0), *messages]
     for message in sent:
         sensors.add(0, sender.pack(message))
     left = iter(range(len(sent)))
-    events = sensors.events(VEHICLE, regressor, lambda: next(left, None) is None)
+    events = sensors.events(regressor, lambda: next(left, None) is None)
     return [event for event in events if isinstance(event, Reading)]
 
 
