@@ -11,6 +11,7 @@ from magcomp import autopilots
 from magcomp.align import controls, expected_earth, has_position, readings, reported, thinned
 from magcomp.align.health import compass_complaints, current_complaints, vehicle_complaints
 from magcomp.analysis.choose import with_speed_controllers
+from magcomp.analysis.compare import Judged, beaten, better, comparison
 from magcomp.analysis.emit import Emission, emit
 from magcomp.analysis.multiplied import kinds_to_try, multiplied_notes, why_only_to_look_at
 from magcomp.analysis.vehicle_words import in_words_of
@@ -32,8 +33,6 @@ from magcomp.model import (
     Analysis,
     CompassResult,
     Control,
-    Grade,
-    MotorFit,
     Recording,
     Verdict,
     pack,
@@ -42,10 +41,6 @@ from magcomp.model import (
 
 ESC = "esc"
 REGRESSORS = ("auto", CURRENT, THROTTLE, "motors", ESC)
-
-BETTER = 0.97
-"""Throttle is written instead of current only where it leaves less than this share unexplained:
-current needs no battery at the same voltage."""
 
 Progress = Callable[[str, float], None]
 """What is being done, and the share done, 0 … 1."""
@@ -126,10 +121,14 @@ def analyse(
     kinds = _kinds(recording, found, wanted)
     earth = expected_earth(recording)
     steps = len(kinds) * len(compasses)
-    judged: dict[str, list[_Judged]] = {}
+    judged: dict[str, list[Judged]] = {}
     lacking: dict[int, MissingDataError] = {}
+    plain: dict[str, tuple[float, ...]] = {}
     for kind in kinds:
         forms = [control for control in found if control.kind == kind]
+        if kind == THROTTLE and CURRENT in judged and (left := beaten(judged[CURRENT], forms)):
+            plain[kind] = left
+            continue
         for compass in compasses:
             progress(f"compass {compass} by {kind}", sum(map(len, judged.values())) / steps)
             try:
@@ -142,9 +141,10 @@ def analyse(
     if not judged:
         raise _with_cure(recording, compasses[0], lacking[compasses[0]])
     progress("done", 1.0)
-    chosen = _choose(judged)
+    chosen = better(judged)
     emitted = emit(recording, [j.fit for j in judged[chosen]])
-    nothing = all(j.verdict.grade is Grade.REJECTED for j in judged[chosen])
+    nothing = all(j.is_rejected for j in judged[chosen])
+    held_out = {k: tuple(j.held_out for j in results) for k, results in judged.items()} | plain
     why_not = why_only_to_look_at(recording, chosen)
     return Analysis(
         source=recording.source,
@@ -158,19 +158,18 @@ def analyse(
             )
             for j in judged[chosen]
         ),
-        notes=(*_notes(recording, wanted, judged, chosen), *_lacking_notes(lacking, judged)),
+        notes=(*_notes(recording, wanted, held_out, chosen), *_lacking_notes(lacking, judged)),
         only_to_look_at=why_not,
     )
 
 
-def _result(judged: _Judged, emitted: Emission, *, nothing_accepted: bool) -> CompassResult:
-    rejected = judged.verdict.grade is Grade.REJECTED
+def _result(judged: Judged, emitted: Emission, *, nothing_accepted: bool) -> CompassResult:
     left_out = {} if nothing_accepted else emitted.left_out
     return CompassResult(
         fit=judged.fit,
         verdict=judged.verdict,
         in_force=judged.problem.readings.in_force[-1].correction,
-        parameters=left_out if rejected else emitted.accepted,
+        parameters=left_out if judged.is_rejected else emitted.accepted,
         insisted=emitted.accepted,
         left_out=emitted.left_out,
     )
@@ -218,13 +217,6 @@ def regressor_in_force(recording: Recording) -> str:
     return in_force or _controls_of(recording)[0].kind
 
 
-@dataclass(frozen=True, eq=False)
-class _Judged:
-    problem: Problem
-    fit: MotorFit
-    verdict: Verdict
-
-
 def _one(
     recording: Recording,
     compass: int,
@@ -232,7 +224,7 @@ def _one(
     forms: Iterable[Control],
     in_force: Mapping[str, Control],
     earth: EarthField,
-) -> _Judged:
+) -> Judged:
     new = thinned(readings(recording, compass, start=wanted.start, end=wanted.end))
     require_readings(new)
     with solvable(compass):
@@ -241,7 +233,7 @@ def _one(
     with solvable(compass):
         found, verdict = judge(problem, fit(problem, wanted.method), complaints=complaints)
     require_finite(compass, (found.covariance, pack(found.correction), *_bounds(verdict)))
-    return _Judged(problem, found, _in_words_of(recording, verdict))
+    return Judged(problem, found, _in_words_of(recording, verdict))
 
 
 def _bounds(verdict: Verdict) -> list[float]:
@@ -307,28 +299,6 @@ def _compasses(recording: Recording, wanted: Options) -> list[int]:
     return found
 
 
-def _choose(judged: Mapping[str, list[_Judged]]) -> str:
-    """The control quantity that predicts held-out data better; current where it is close."""
-
-    def unexplained(kind: str) -> float:
-        # A sweep's residual rows have three components, the others' two.
-        logs = [
-            np.log(max(j.verdict.residual.held_out, 1e-6) / np.sqrt(2 + (j.fit.method == "sweep")))
-            for j in judged[kind]
-        ]
-        return float(np.exp(np.mean(logs)))
-
-    if len(judged) == 1:
-        return next(iter(judged))
-    rejected = {
-        kind: all(j.verdict.grade is Grade.REJECTED for j in results)
-        for kind, results in judged.items()
-    }
-    if rejected[THROTTLE] or rejected[CURRENT]:
-        return CURRENT if rejected[THROTTLE] else THROTTLE
-    return THROTTLE if unexplained(THROTTLE) < BETTER * unexplained(CURRENT) else CURRENT
-
-
 def _with_cure(recording: Recording, compass: int, lacking: MissingDataError) -> MissingDataError:
     if compass not in recording.field:
         return lacking
@@ -337,7 +307,7 @@ def _with_cure(recording: Recording, compass: int, lacking: MissingDataError) ->
 
 
 def _lacking_notes(
-    lacking: Mapping[int, MissingDataError], judged: Mapping[str, list[_Judged]]
+    lacking: Mapping[int, MissingDataError], judged: Mapping[str, list[Judged]]
 ) -> Iterable[str]:
     done = {j.fit.compass for results in judged.values() for j in results}
     for compass, why in sorted(lacking.items()):
@@ -346,16 +316,10 @@ def _lacking_notes(
 
 
 def _notes(
-    recording: Recording, wanted: Options, judged: Mapping[str, list[_Judged]], chosen: str
+    recording: Recording, wanted: Options, held_out: Mapping[str, tuple[float, ...]], chosen: str
 ) -> Iterable[str]:
-    if len(judged) > 1:
-        scores = ", ".join(
-            f"{kind} leaves "
-            + "/".join(f"{j.verdict.residual.held_out:.1f}" for j in results)
-            + " mGauss"
-            for kind, results in judged.items()
-        )
-        yield f"{chosen} is used because it is the better choice on held-out data: {scores}"
+    if len(held_out) > 1:
+        yield comparison(held_out, chosen)
     elif quantity_of(chosen).is_throttle and recording.current is None:
         yield "the log holds no battery current, so throttle is used"
     if not has_position(recording):
