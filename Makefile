@@ -3,14 +3,18 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 
-.PHONY: demo test test-all coverage check lint lock benchmark docs pictures release clean
+.PHONY: demo test tests-only test-all coverage check lint lock benchmark docs pictures release clean
 
 demo: $(VENV)/installed
 	@$(BIN)/magcomp demo
 
 # All but what waits or computes for tens of seconds; `make test-all` has that too, and looks
 # five times as long for what breaks a parser or a protocol.
-test: $(VENV)/installed-dev lint
+# The linters run beside the tests, in the time in which those wait for each other.
+test: $(VENV)/installed-dev
+	@$(MAKE) --no-print-directory -j 2 lint tests-only
+
+tests-only: $(VENV)/installed-dev
 	@$(BIN)/python -m pytest -n 2 --dist worksteal -q -m "not slow"
 
 test-all: $(VENV)/installed-dev lint
@@ -72,7 +76,7 @@ $(VENV)/installed: pyproject.toml | $(VENV)/bin/python
 
 $(VENV)/installed-dev: pyproject.toml | $(VENV)/bin/python
 	@echo "Setting up magcomp and its test tools in $(VENV) ..."
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile -e '.[dev]'
 	@touch $(VENV)/installed $@
 
 clean:
