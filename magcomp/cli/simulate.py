@@ -67,6 +67,12 @@ def _fault_options(command: Callable[..., _Result]) -> Callable[..., _Result]:
     help="What it does once a ground station speaks to it.",
 )
 @click.option(
+    "--motor-spread",
+    type=click.FloatRange(0.0, 10.0),
+    metavar="SHARE",
+    help="How unequally its motors disturb, as a share of the interference; 0.05 by default.",
+)
+@click.option(
     "--speed",
     type=float,
     default=1.0,
@@ -105,6 +111,7 @@ def simulate(
     seed: int,
     autopilot: str,
     program: str,
+    motor_spread: float | None,
     speed: float,
     faults: Faults | None,
     truth: Path | None,
@@ -121,7 +128,7 @@ def simulate(
     written. Its compasses are disturbed by its motors; --truth says how. Ctrl-C ends it.
     """
     key = None if signing_key is None else read_signing_key(signing_key)
-    chosen = scenario(program, seed)
+    chosen = scenario(program, seed, motor_spread=motor_spread)
     held = {} if parameters is None else read_parameters(parameters).values
     vehicle = Vehicle(
         chosen,
