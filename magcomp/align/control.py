@@ -10,6 +10,7 @@ does not bias a slope the way an error of interpolation does.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -20,8 +21,10 @@ from magcomp.align.sample import interpolate
 from magcomp.autopilots.protocol import MotorOutputs
 from magcomp.model import (
     CURRENT,
+    MOTORS,
     SPEED_CONTROLLERS,
     THROTTLE,
+    BoolArray,
     Control,
     FloatArray,
     Recording,
@@ -31,6 +34,8 @@ from magcomp.model import (
 _SHIFTS = np.arange(-0.2, 0.301, 0.02)
 _TREND_S = 5.0
 _LEAST_ROWS = 30
+_POWERS = (1, 2, 3)
+_LEAST_MOTORS = 2
 _LEAST_EXPLAINED = 0.8
 _FINER = 4.0
 _CUT_SHARE = 0.1
@@ -43,10 +48,24 @@ _MOST_ROWS = 1_000_000
 
 
 class _Rebuilt(NamedTuple):
-    """A form of a quantity, and the mean square it leaves of what was reported."""
+    """A form of a quantity, and how it came about.
+
+    Attributes
+    ----------
+    control
+        The form.
+    cost
+        Mean square it leaves of what was reported.
+    coefficients
+        Of 1 and of the means of the duties' powers.
+    trend
+        What drifts slowly and was added, shape (n,).
+    """
 
     control: Control
     cost: float
+    coefficients: FloatArray
+    trend: FloatArray
 
 
 def controls(recording: Recording) -> tuple[Control, ...]:
@@ -86,6 +105,35 @@ def controls(recording: Recording) -> tuple[Control, ...]:
     return tuple(found)
 
 
+def currents_of_motors(recording: Recording) -> Control | None:
+    """The current of each motor, from the battery's current and what drives each motor.
+
+    Returns
+    -------
+    Control or None
+        Parts of shape (n, k), in A, that add up to the battery's current; None where the recording
+        lacks the current or the outputs, or the one does not follow the other.
+
+    Notes
+    -----
+    The battery's current is regressed on powers of all duties. Each power is a sum over the
+    motors, so each motor's share of it is its current (docs/method.md, Motor by motor).
+    """
+    motors = _motors(recording)
+    duty = _duty(recording.outputs, motors)
+    if recording.current is None or recording.outputs is None or motors is None or duty is None:
+        return None
+    count = duty.value.shape[1]
+    rebuilt = _rebuilt(recording.current, duty, MOTORS, "battery current, shared by motor outputs")
+    if rebuilt is None or count < _LEAST_MOTORS:
+        return None
+    level, *slopes = rebuilt.coefficients
+    curved = sum(slope * duty.value**power for slope, power in zip(slopes, _POWERS, strict=True))
+    each = np.maximum((level + curved + rebuilt.trend[:, None]) / count, 0.0)
+    series = Series(rebuilt.control.series.time, each)
+    return replace(rebuilt.control, series=series, numbers=_driven(recording.outputs, motors))
+
+
 def reported(found: tuple[Control, ...]) -> dict[str, Control]:
     """The first, that is the reported, form of each kind."""
     by_kind: dict[str, Control] = {}
@@ -108,12 +156,25 @@ def _duty(outputs: Series | None, motors: MotorOutputs | None) -> Series | None:
     """Duty 0 … 1 of each motor that is driven, shape (n, motors)."""
     if outputs is None or motors is None or len(outputs) < _LEAST_ROWS:
         return None
-    channels = [c for c in motors.channels if outputs.value[:, c].any()]
-    if not channels:
+    runs = _running(outputs, motors)
+    if not runs.any():
         return None
+    channels = np.array(motors.channels)[runs]
     driven = outputs.value[:, channels]
     duty = np.clip((driven - motors.low) / (motors.high - motors.low), 0.0, 1.0)
     return Series(outputs.time, duty)
+
+
+def _running(outputs: Series, motors: MotorOutputs) -> BoolArray:
+    """Which of the motors' channels are driven at all."""
+    return np.asarray(outputs.value[:, list(motors.channels)].any(axis=0))
+
+
+def _driven(outputs: Series, motors: MotorOutputs) -> tuple[int, ...]:
+    """The numbers of the motors that are driven; those of the channels where none are told."""
+    numbers = motors.numbers or tuple(range(1, len(motors.channels) + 1))
+    runs = _running(outputs, motors)
+    return tuple(number for number, does in zip(numbers, runs, strict=True) if does)
 
 
 def _motors(recording: Recording) -> MotorOutputs | None:
@@ -173,7 +234,7 @@ def _rebuilt(reference: Series, duty: Series, kind: str, name: str) -> _Rebuilt 
     """
     if len(reference) < _LEAST_ROWS:
         return None
-    powers = np.stack([np.mean(duty.value**k, axis=1) for k in (1, 2, 3)], axis=1)
+    powers = np.stack([np.mean(duty.value**k, axis=1) for k in _POWERS], axis=1)
     features = Series(duty.time, powers)
     plain = _rebuilt_through(reference, features, 0.0, kind, name)
     if plain is None:
@@ -204,8 +265,9 @@ def _rebuilt_through(
     left = reference.value - interpolate(as_reported, reference.time)
     trend = _running_mean(Series(reference.time, left), _TREND_S)
     modelled = coefficients[0] + features.value @ coefficients[1:]
-    value = np.maximum(modelled + interpolate(trend, time), 0.0)
-    return _Rebuilt(Control(kind, Series(time, value), name), cost)
+    slow = interpolate(trend, time)
+    value = np.maximum(modelled + slow, 0.0)
+    return _Rebuilt(Control(kind, Series(time, value), name), cost, coefficients, slow)
 
 
 def _smoothed(series: Series, constant: float) -> Series:

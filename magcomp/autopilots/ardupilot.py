@@ -60,7 +60,11 @@ from magcomp.model import (
     Vehicle,
 )
 
-_MOTOR_FUNCTIONS = frozenset([*range(33, 41), *range(82, 86)])
+_MOTOR_FUNCTIONS = {
+    function: number for number, function in enumerate([*range(33, 41), *range(82, 86)], start=1)
+}
+"""SERVOn_FUNCTION to the number of the motor that it drives."""
+
 _DEFAULT_MOTORS = 4
 _OUTPUTS_ASKED_FOR = 8
 _CURVE_NAMES = ("MOT_THST_EXPO", "MOT_SPIN_MIN", "MOT_SPIN_MAX")
@@ -155,19 +159,20 @@ class ArduPilot:
         AP_MotorsMulticopter: output = spin_min + (spin_max − spin_min) · c(thrust), with
         thrust = (1 − expo) · c + expo · c².
         """
-        by_function = [
-            index
-            for index in range(outputs)
-            if parameters.last(f"SERVO{index + 1}_FUNCTION", 0.0) in _MOTOR_FUNCTIONS
-        ]
-        channels = by_function or range(min(_DEFAULT_MOTORS, outputs))
+        functions = [parameters.last(f"SERVO{index + 1}_FUNCTION", 0.0) for index in range(outputs)]
+        driven = {
+            index: _MOTOR_FUNCTIONS[function]
+            for index, function in enumerate(functions)
+            if function in _MOTOR_FUNCTIONS
+        } or {index: index + 1 for index in range(min(_DEFAULT_MOTORS, outputs))}
         low, high = (
             parameters.last(name, 0.0) or default
             for name, default in zip(_PWM_NAMES, (1000.0, 2000.0), strict=True)
         )
         if not high > low:
             return None
-        return MotorOutputs(tuple(channels), low, high, self._thrust_curve(parameters))
+        curve = self._thrust_curve(parameters)
+        return MotorOutputs(tuple(driven), low, high, curve, tuple(driven.values()))
 
     @staticmethod
     def _thrust_curve(parameters: ParameterHistory) -> ThrustCurve | None:

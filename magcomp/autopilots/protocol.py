@@ -147,12 +147,15 @@ class MotorOutputs:
         Microseconds of duty 0 and 1.
     curve
         From thrust demand to duty; None where unknown.
+    numbers
+        The motor that each channel drives, as the firmware counts them, from 1.
     """
 
     channels: tuple[int, ...]
     low: float
     high: float
     curve: ThrustCurve | None
+    numbers: tuple[int, ...] = ()
 
 
 class Autopilot(Protocol):

@@ -11,11 +11,11 @@ from magcomp.errors import FitRejectedError, MissingDataError, UsageError
 from magcomp.fit.field_model import (
     FIELD_LAG,
     REGRESSOR_LAG,
-    SIZE,
     STRENGTH,
     correction_at,
     indices_of_correction,
     lags_of,
+    parameters_of,
     vertical_of,
 )
 from magcomp.fit.flight import (
@@ -31,18 +31,17 @@ from magcomp.fit.flight import (
 )
 from magcomp.fit.folds import folds
 from magcomp.fit.levels import centres_of_flight, fit_levels, usable_levels, with_line
+from magcomp.fit.motors import alike_where_unseen
 from magcomp.fit.residual import residuals, spread
 from magcomp.fit.robust import Estimate
 from magcomp.fit.sweep import fit_sweep, is_still
 from magcomp.model import (
-    CORRECTION_SIZE,
     OFFSET,
     BoolArray,
     FloatArray,
     Lags,
     MotorFit,
     Readings,
-    pack,
 )
 
 METHODS = ("auto", "sweep", "levels", "flight")
@@ -148,16 +147,8 @@ def refit(problem: Problem, fit: MotorFit, keep: BoolArray) -> MotorFit:
             return fit
         again = fit_levels(part, rows, level)[0]
         return replace(again, lags=fit.lags, lags_std=fit.lags_std, vertical=fit.vertical)
-    packed = pack(fit.correction)
-    start = np.concatenate(
-        [
-            packed[:CORRECTION_SIZE],
-            [fit.strength, fit.vertical / fit.strength, fit.lags.field, fit.lags.regressor],
-            np.zeros(SIZE - CORRECTION_SIZE - 4),
-            packed[CORRECTION_SIZE:],
-        ]
-    )
-    return _updated(fit, near(part, _groups(fit), start))
+    found = near(part, _groups(fit), parameters_of(fit, fit.lags))
+    return _updated(fit, found)
 
 
 def _with_lags(problem: Problem, fit: MotorFit) -> MotorFit:
@@ -170,6 +161,8 @@ def _with_lags(problem: Problem, fit: MotorFit) -> MotorFit:
 def fit_flight(problem: Problem) -> MotorFit:
     """Fit a flight, opening as many groups of parameters as the data deserve."""
     found, free = with_wander(problem, *_choose_freedom(problem))
+    if problem.control.parts > 1:
+        found = alike_where_unseen(found)
     lags = lags_of(found.parameters)
     samples = problem.sample(lags)
     std = np.sqrt(np.diag(found.covariance))
@@ -194,6 +187,7 @@ def fit_flight(problem: Problem) -> MotorFit:
         u_low=float(np.quantile(samples.total, 0.02)),
         u_high=float(np.quantile(samples.total, 0.98)),
         count=len(samples),
+        numbers=problem.control.numbers,
     )
     centres = centres_of_flight(samples, correction, (bare.strength, bare.vertical), bare.noise)
     return with_line(bare, centres)

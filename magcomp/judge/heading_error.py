@@ -70,7 +70,7 @@ def heading_errors(
     earth = np.array([horizontal, 0.0, fit.vertical])
     field = body_from_earth(roll, pitch, yaw) @ earth
     draws = rng.multivariate_normal(
-        np.zeros(CORRECTION_SIZE), fit.covariance, size=_DRAWS, method="eigh"
+        np.zeros(CORRECTION_SIZE), fit.shared_covariance, size=_DRAWS, method="eigh"
     )
     inverse = np.linalg.inv(fit.correction.soft_iron)
     rows = []

@@ -120,22 +120,22 @@ def _widened(fit: MotorFit, motors: FloatArray) -> MotorFit:
     """
     count = len(motors)
     jackknife = (count - 1) / count * np.sum((motors - motors.mean(axis=0)) ** 2, axis=0)
-    stated = np.maximum(np.diag(fit.covariance)[MOTOR], 1e-18)
+    stated = np.maximum(np.diag(fit.shared_covariance)[MOTOR], 1e-18)
     factor = max(1.0, float(np.mean(jackknife / stated))) if fit.method != "flight" else 1.0
-    scale = np.full(CORRECTION_SIZE, np.sqrt(factor) * UNSEEN)
+    scale = np.full(len(fit.covariance), np.sqrt(factor) * UNSEEN)
     if fit.method == "sweep":
         # What a vehicle at rest cannot show does not scatter between its folds either.
-        scale[MOTOR.stop :] = 1.0
+        scale[MOTOR.stop : CORRECTION_SIZE] = 1.0
     widened = fit.covariance * np.outer(scale, scale) + np.diag(_floor(fit) ** 2)
     return replace(fit, covariance=widened)
 
 
 def _floor(fit: MotorFit) -> FloatArray:
-    """Standard errors that no residual shows, of the 12 parameters."""
+    """Standard errors that no residual shows, one a parameter."""
     bent = not quantity_of(fit.regressor).is_straight and fit.method == "flight"
     motor = (FLOOR_THROTTLE if bent else FLOOR_MOTOR) * float(np.linalg.norm(fit.correction.vector))
-    floor = np.full(CORRECTION_SIZE, FLOOR_SOFT_IRON)
-    floor[MOTOR] = motor
+    floor = np.full(len(fit.covariance), FLOOR_SOFT_IRON)
+    floor[MOTOR] = floor[CORRECTION_SIZE:] = motor
     floor[OFFSET] = np.hypot(FLOOR_OFFSET_MGAUSS, motor * fit.u_high / 2.0 if bent else 0.0)
     return floor
 

@@ -23,7 +23,15 @@ from magcomp.model.fit import (
     unpack,
 )
 from magcomp.model.parameters import ParameterSet
-from magcomp.model.quantity import CURRENT, QUANTITIES, THROTTLE, Quantity, quantity_of, unit_of
+from magcomp.model.quantity import (
+    CURRENT,
+    MOTORS,
+    QUANTITIES,
+    THROTTLE,
+    Quantity,
+    quantity_of,
+    unit_of,
+)
 from magcomp.model.recording import (
     SPEED_CONTROLLERS,
     Applied,
@@ -52,6 +60,7 @@ __all__ = [
     "CORRECTION_SIZE",
     "CURRENT",
     "MOTOR",
+    "MOTORS",
     "OFFSET",
     "QUANTITIES",
     "SOFT_IRON",

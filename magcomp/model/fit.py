@@ -152,6 +152,8 @@ class MotorFit:
     kept
         Whether the correction is the one that was in force, because the data cannot tell it from
         a better one.
+    numbers
+        Of which motor each part of the control quantity is; empty where it has one part.
     """
 
     compass: int
@@ -173,6 +175,7 @@ class MotorFit:
     u_high: float
     count: int
     kept: bool = False
+    numbers: tuple[int, ...] = ()
 
     @property
     def interference(self) -> FloatArray:
@@ -182,7 +185,21 @@ class MotorFit:
     @property
     def interference_std(self) -> FloatArray:
         """Standard errors of :attr:`interference`, shape (3,)."""
-        return np.asarray(np.sqrt(np.diag(self.covariance)[MOTOR]))
+        return np.asarray(np.sqrt(np.diag(self.shared_covariance)[MOTOR]))
+
+    @property
+    def shared_covariance(self) -> FloatArray:
+        """Covariance where all parts share the total alike, shape (12, 12).
+
+        Of the 12 parameters ``Correction.vector``, offset and soft iron: :attr:`covariance` itself
+        where the control quantity has one part.
+        """
+        parts = self.correction.motor.shape[1]
+        mean = np.zeros((CORRECTION_SIZE, len(self.covariance)))
+        mean[:, :CORRECTION_SIZE] = np.eye(CORRECTION_SIZE)
+        mean[MOTOR, MOTOR] /= parts
+        mean[MOTOR, CORRECTION_SIZE:] = np.tile(np.eye(3) / parts, parts - 1)
+        return np.asarray(mean @ self.covariance @ mean.T)
 
 
 class Grade(StrEnum):

@@ -7,7 +7,7 @@ asks :func:`quantity_of`.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -18,6 +18,8 @@ Told = TypeVar("Told")
 
 THROTTLE = "throttle"
 CURRENT = "current"
+MOTORS = "motors"
+"""The current of each motor."""
 
 _MOST_ROWS = 50
 
@@ -149,7 +151,9 @@ _SHARE = Quantity(
     how_to_vary="fly climbs and descents",
 )
 
-QUANTITIES: Mapping[str, Quantity] = {each.name: each for each in (_AMPERES, _SHARE)}
+_EACH = replace(_AMPERES, name=MOTORS)
+
+QUANTITIES: Mapping[str, Quantity] = {each.name: each for each in (_AMPERES, _SHARE, _EACH)}
 """By name."""
 
 

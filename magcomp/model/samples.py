@@ -97,11 +97,14 @@ class Control:
         The quantity, shape (n,), or its parts, shape (n, k), in the quantity's unit.
     origin
         In words: which messages it was made of.
+    numbers
+        Of which motor each part is, as the firmware counts them; empty where there is one part.
     """
 
     kind: str
     series: Series
     origin: str
+    numbers: tuple[int, ...] = ()
 
     @property
     def parts(self) -> int:
