@@ -10,7 +10,6 @@ does not bias a slope the way an error of interpolation does.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +20,6 @@ from magcomp.align.sample import interpolate
 from magcomp.autopilots.protocol import MotorOutputs
 from magcomp.model import (
     CURRENT,
-    MOTORS,
     SPEED_CONTROLLERS,
     THROTTLE,
     BoolArray,
@@ -34,8 +32,7 @@ from magcomp.model import (
 _SHIFTS = np.arange(-0.2, 0.301, 0.02)
 _TREND_S = 5.0
 _LEAST_ROWS = 30
-_POWERS = (1, 2, 3)
-_LEAST_MOTORS = 2
+POWERS = (1, 2, 3)
 _LEAST_EXPLAINED = 0.8
 _FINER = 4.0
 _CUT_SHARE = 0.1
@@ -47,7 +44,7 @@ _MOST_ROWS = 1_000_000
 """More rows in even steps than this mean that the times are not to be trusted."""
 
 
-class _Rebuilt(NamedTuple):
+class Rebuilt(NamedTuple):
     """A form of a quantity, and how it came about.
 
     Attributes
@@ -68,6 +65,21 @@ class _Rebuilt(NamedTuple):
     trend: FloatArray
 
 
+class Duty(NamedTuple):
+    """How hard each motor is driven.
+
+    Attributes
+    ----------
+    series
+        Duty 0 … 1, shape (n, k).
+    numbers
+        Of which motor each column is, as the firmware counts them.
+    """
+
+    series: Series
+    numbers: tuple[int, ...]
+
+
 def controls(recording: Recording) -> tuple[Control, ...]:
     """Every usable form of every control quantity of a recording, reported forms first.
 
@@ -85,7 +97,7 @@ def controls(recording: Recording) -> tuple[Control, ...]:
         name = "the speed controllers' current" if of_escs else "battery current"
         found.append(Control(CURRENT, recording.current, name))
         rebuilt = [
-            _rebuilt(recording.current, features, CURRENT, f"{name}, rebuilt from the {source}")
+            rebuild(recording.current, features, CURRENT, f"{name}, rebuilt from the {source}")
             for features, source in _finer(recording, duty)
         ]
         found.extend(_best(rebuilt))
@@ -101,37 +113,8 @@ def controls(recording: Recording) -> tuple[Control, ...]:
                 )
             else:
                 name = "reported throttle, rebuilt from the motor outputs"
-                found.extend(_best([_rebuilt(throttle, duty, THROTTLE, name)]))
+                found.extend(_best([rebuild(throttle, duty, THROTTLE, name)]))
     return tuple(found)
-
-
-def currents_of_motors(recording: Recording) -> Control | None:
-    """The current of each motor, from the battery's current and what drives each motor.
-
-    Returns
-    -------
-    Control or None
-        Parts of shape (n, k), in A, that add up to the battery's current; None where the recording
-        lacks the current or the outputs, or the one does not follow the other.
-
-    Notes
-    -----
-    The battery's current is regressed on powers of all duties. Each power is a sum over the
-    motors, so each motor's share of it is its current (docs/method.md, Motor by motor).
-    """
-    motors = _motors(recording)
-    duty = _duty(recording.outputs, motors)
-    if recording.current is None or recording.outputs is None or motors is None or duty is None:
-        return None
-    count = duty.value.shape[1]
-    rebuilt = _rebuilt(recording.current, duty, MOTORS, "battery current, shared by motor outputs")
-    if rebuilt is None or count < _LEAST_MOTORS:
-        return None
-    level, *slopes = rebuilt.coefficients
-    curved = sum(slope * duty.value**power for slope, power in zip(slopes, _POWERS, strict=True))
-    each = np.maximum((level + curved + rebuilt.trend[:, None]) / count, 0.0)
-    series = Series(rebuilt.control.series.time, each)
-    return replace(rebuilt.control, series=series, numbers=_driven(recording.outputs, motors))
 
 
 def reported(found: tuple[Control, ...]) -> dict[str, Control]:
@@ -165,16 +148,20 @@ def _duty(outputs: Series | None, motors: MotorOutputs | None) -> Series | None:
     return Series(outputs.time, duty)
 
 
+def duty_of(recording: Recording) -> Duty | None:
+    """How hard each motor is driven; None where the recording does not tell."""
+    motors = _motors(recording)
+    duty = _duty(recording.outputs, motors)
+    if recording.outputs is None or motors is None or duty is None:
+        return None
+    numbers = motors.numbers or tuple(range(1, len(motors.channels) + 1))
+    runs = _running(recording.outputs, motors)
+    return Duty(duty, tuple(n for n, does in zip(numbers, runs, strict=True) if does))
+
+
 def _running(outputs: Series, motors: MotorOutputs) -> BoolArray:
     """Which of the motors' channels are driven at all."""
     return np.asarray(outputs.value[:, list(motors.channels)].any(axis=0))
-
-
-def _driven(outputs: Series, motors: MotorOutputs) -> tuple[int, ...]:
-    """The numbers of the motors that are driven; those of the channels where none are told."""
-    numbers = motors.numbers or tuple(range(1, len(motors.channels) + 1))
-    runs = _running(outputs, motors)
-    return tuple(number for number, does in zip(numbers, runs, strict=True) if does)
 
 
 def _motors(recording: Recording) -> MotorOutputs | None:
@@ -219,13 +206,13 @@ def _finer(recording: Recording, duty: Series | None) -> list[tuple[Series, str]
     return found
 
 
-def _best(forms: list[_Rebuilt | None]) -> list[Control]:
+def _best(forms: list[Rebuilt | None]) -> list[Control]:
     """The form that explains what was reported best; none where none does."""
     whole = [form for form in forms if form is not None]
     return [min(whole, key=lambda form: form.cost).control] if whole else []
 
 
-def _rebuilt(reference: Series, duty: Series, kind: str, name: str) -> _Rebuilt | None:
+def rebuild(reference: Series, duty: Series, kind: str, name: str) -> Rebuilt | None:
     """The reference regressed on powers of the duty, shape (n, k), sampled more often.
 
     A battery monitor smooths what it measures. Where the duty is told often enough to show that,
@@ -234,7 +221,7 @@ def _rebuilt(reference: Series, duty: Series, kind: str, name: str) -> _Rebuilt 
     """
     if len(reference) < _LEAST_ROWS:
         return None
-    powers = np.stack([np.mean(duty.value**k, axis=1) for k in _POWERS], axis=1)
+    powers = np.stack([np.mean(duty.value**k, axis=1) for k in POWERS], axis=1)
     features = Series(duty.time, powers)
     plain = _rebuilt_through(reference, features, 0.0, kind, name)
     if plain is None:
@@ -252,9 +239,9 @@ def _rebuilt(reference: Series, duty: Series, kind: str, name: str) -> _Rebuilt 
 
 def _rebuilt_through(
     reference: Series, features: Series, smoothing: float, kind: str, name: str
-) -> _Rebuilt | None:
+) -> Rebuilt | None:
     """The quantity of which the reference is the smoothed one."""
-    seen = _smoothed(features, smoothing)
+    seen = smoothed(features, smoothing)
     fits = [_regress(reference, seen, shift) for shift in _SHIFTS]
     best = min(range(len(fits)), key=lambda k: fits[k][1])
     coefficients, cost = fits[best]
@@ -267,10 +254,10 @@ def _rebuilt_through(
     modelled = coefficients[0] + features.value @ coefficients[1:]
     slow = interpolate(trend, time)
     value = np.maximum(modelled + slow, 0.0)
-    return _Rebuilt(Control(kind, Series(time, value), name), cost, coefficients, slow)
+    return Rebuilt(Control(kind, Series(time, value), name), cost, coefficients, slow)
 
 
-def _smoothed(series: Series, constant: float) -> Series:
+def smoothed(series: Series, constant: float) -> Series:
     """What a first-order low pass of a time constant in seconds makes of columns, (n, k)."""
     if constant <= 0.0:
         return series

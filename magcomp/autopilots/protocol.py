@@ -158,6 +158,22 @@ class MotorOutputs:
     numbers: tuple[int, ...] = ()
 
 
+@dataclass(frozen=True)
+class MotorLaw:
+    """How a firmware corrects motor by motor: Σ vector · (duty · volts) to the power of exponent.
+
+    Attributes
+    ----------
+    numbers
+        The motors it has vectors for.
+    most_exponent
+        The largest exponent that it takes.
+    """
+
+    numbers: tuple[int, ...]
+    most_exponent: float
+
+
 class Autopilot(Protocol):
     """A firmware.
 
@@ -380,6 +396,31 @@ class Autopilot(Protocol):
         usual
             The control quantity in ordinary flight; 0 where unknown. Where a firmware cannot take
             a value over as it is, the field is right here.
+        """
+        ...
+
+    def motor_law(self, compass: int, values: Mapping[str, float]) -> MotorLaw | None:
+        """How it can correct a compass motor by motor; None where it cannot."""
+        ...
+
+    def per_motor_parameters(
+        self,
+        correction: Correction,
+        exponent: float,
+        compass: int,
+        values: Mapping[str, float],
+        *,
+        soft_iron_fitted: bool,
+    ) -> dict[str, float]:
+        """Parameters that make this vehicle apply a correction motor by motor, switch included.
+
+        Parameters
+        ----------
+        correction
+            Its motor vectors are per volt to the power of ``exponent``, in the order of the
+            law's motors.
+        soft_iron_fitted
+            As for :meth:`correction_parameters`.
         """
         ...
 

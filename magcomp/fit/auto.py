@@ -31,7 +31,7 @@ from magcomp.fit.flight import (
 )
 from magcomp.fit.folds import folds
 from magcomp.fit.levels import centres_of_flight, fit_levels, usable_levels, with_line
-from magcomp.fit.motors import alike_where_unseen
+from magcomp.fit.motors import alike_where_unseen, differences_of
 from magcomp.fit.residual import residuals, spread
 from magcomp.fit.robust import Estimate
 from magcomp.fit.sweep import fit_sweep, is_still
@@ -161,7 +161,9 @@ def _with_lags(problem: Problem, fit: MotorFit) -> MotorFit:
 def fit_flight(problem: Problem) -> MotorFit:
     """Fit a flight, opening as many groups of parameters as the data deserve."""
     found, free = with_wander(problem, *_choose_freedom(problem))
-    if problem.control.parts > 1:
+    tell = differences_of(len(found.parameters))
+    told_apart = tell @ found.covariance @ tell.T
+    if len(told_apart):
         found = alike_where_unseen(found)
     lags = lags_of(found.parameters)
     samples = problem.sample(lags)
@@ -188,6 +190,7 @@ def fit_flight(problem: Problem) -> MotorFit:
         u_high=float(np.quantile(samples.total, 0.98)),
         count=len(samples),
         numbers=problem.control.numbers,
+        told_apart=told_apart,
     )
     centres = centres_of_flight(samples, correction, (bare.strength, bare.vertical), bare.noise)
     return with_line(bare, centres)

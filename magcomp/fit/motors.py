@@ -19,6 +19,9 @@ from magcomp.model import MOTOR, FloatArray
 _WIDTHS = np.concatenate([[0.0], np.geomspace(0.01, 100.0, 41)])
 """Widths tried for the differences, in units of their own median standard error."""
 
+_SMALL = 1e-6
+"""Of the differences' own variance: keeps the matrix from being singular at no width."""
+
 Found = TypeVar("Found", bound=Estimate)
 
 
@@ -79,6 +82,3 @@ def alike_where_unseen(found: Found) -> Found:
         parameters=found.parameters - gain @ apart,
         covariance=found.covariance - gain @ tell @ found.covariance,
     )
-
-
-_SMALL = 1e-6

@@ -10,17 +10,20 @@ import numpy as np
 
 from magcomp.align import interpolate
 from magcomp.fit import Problem
+from magcomp.fit.nearest import moved, nearest
 from magcomp.judge.evidence import cover, field_residual, used_lags
 from magcomp.judge.finding import Finding, severity
 from magcomp.judge.gates import on_control, on_turn, on_unseen_parameters
 from magcomp.judge.heading_error import control_grid, heading_errors
 from magcomp.judge.keep import is_close, keep
+from magcomp.judge.motors import on_motors
 from magcomp.judge.thresholds import Thresholds
 from magcomp.judge.whole import on_constancy, on_earth
 from magcomp.model import (
     CORRECTION_SIZE,
     MOTOR,
     OFFSET,
+    Correction,
     Coverage,
     FieldResidual,
     FloatArray,
@@ -83,13 +86,11 @@ def judge(
     residual, motors = field_residual(problem, fit)
     fit = _widened(fit, motors)
     in_force = problem.readings.in_force[-1]
-    table = partial(
-        heading_errors, fit, in_force.correction, _present_control(problem, samples, fit)
-    )
+    present = _present_by(problem, samples)
+    table = partial(heading_errors, fit, present, _present_control(problem, samples, fit))
     errors = table(rng)
-    stays = in_force.regressor in (None, fit.regressor) and is_close(
-        fit, in_force.correction, errors
-    )
+    alike = in_force.regressor in (None, fit.regressor) and problem.control.parts == 1
+    stays = alike and is_close(fit, in_force.correction, errors)
     if stays:
         errors = table(rng, keep=True)
         residual = replace(residual, after=residual.before, held_out=residual.held_out_before)
@@ -99,6 +100,7 @@ def judge(
         *on_earth(problem, samples, fit),
         *on_constancy(problem, fit, limits),
         *on_unseen_parameters(in_force.unseen),
+        *on_motors(fit, covered, limits),
         *_findings(fit, errors, residual, covered, limits),
     ]
     grade = max((f.grade for f in findings), key=severity, default=Grade.GOOD)
@@ -146,9 +148,22 @@ def _present_control(problem: Problem, samples: Samples, fit: MotorFit) -> Float
     kind = problem.readings.in_force[-1].regressor
     if kind in (None, fit.regressor) or kind not in problem.in_force:
         return grid
+    if problem.in_force[kind].parts > 1:
+        return grid
     other = interpolate(problem.in_force[kind].series, samples.time - samples.lags.regressor)
     slope, intercept = np.polyfit(samples.total, other, 1)
     return np.asarray(np.maximum(intercept + slope * grid, 0.0))
+
+
+def _present_by(problem: Problem, samples: Samples) -> Correction:
+    """The correction in force; one motor by motor as the nearest by the fit's own quantity."""
+    present = problem.readings.in_force[-1]
+    known = problem.in_force.get(present.regressor or "")
+    if known is None or known.parts == 1:
+        return present.correction
+    then = samples.time - samples.lags.regressor
+    added = present.correction.added(present.multiplied(interpolate(known.series, then)))
+    return moved(present.correction, nearest(added, samples.total[:, None])[0])
 
 
 def _findings(

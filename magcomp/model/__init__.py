@@ -22,9 +22,11 @@ from magcomp.model.fit import (
     symmetric,
     unpack,
 )
+from magcomp.model.forms import AsWritten, Form
 from magcomp.model.parameters import ParameterSet
 from magcomp.model.quantity import (
     CURRENT,
+    DRIVE,
     MOTORS,
     QUANTITIES,
     THROTTLE,
@@ -59,6 +61,7 @@ from magcomp.model.samples import (
 __all__ = [
     "CORRECTION_SIZE",
     "CURRENT",
+    "DRIVE",
     "MOTOR",
     "MOTORS",
     "OFFSET",
@@ -68,6 +71,7 @@ __all__ = [
     "THROTTLE",
     "Analysis",
     "Applied",
+    "AsWritten",
     "BoolArray",
     "Compass",
     "CompassResult",
@@ -76,6 +80,7 @@ __all__ = [
     "Coverage",
     "FieldResidual",
     "FloatArray",
+    "Form",
     "Grade",
     "HeadingError",
     "InForce",

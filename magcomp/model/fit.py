@@ -8,6 +8,7 @@ from enum import StrEnum
 
 import numpy as np
 
+from magcomp.model.forms import AsWritten, Form
 from magcomp.model.recording import FloatArray, Vehicle
 from magcomp.model.samples import Correction, Lags
 
@@ -154,6 +155,10 @@ class MotorFit:
         a better one.
     numbers
         Of which motor each part of the control quantity is; empty where it has one part.
+    told_apart
+        Covariance of how the motors' vectors differ, as the recording alone tells it,
+        (mGauss per unit)², shape (3 (k − 1), 3 (k − 1)); empty where the control quantity has one
+        part.
     """
 
     compass: int
@@ -176,6 +181,7 @@ class MotorFit:
     count: int
     kept: bool = False
     numbers: tuple[int, ...] = ()
+    told_apart: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
 
     @property
     def interference(self) -> FloatArray:
@@ -320,6 +326,10 @@ class CompassResult:
     left_out
         What would be written for this compass if its fit is not, though another compass's is: one
         switch may serve all compasses.
+    forms
+        What the field may follow, compared on unseen data; empty where only one was tried.
+    as_written
+        What the firmware can apply of the fit, where that is not the fit itself.
     """
 
     fit: MotorFit
@@ -328,6 +338,8 @@ class CompassResult:
     parameters: Mapping[str, float]
     insisted: Mapping[str, float] = field(default_factory=dict)
     left_out: Mapping[str, float] = field(default_factory=dict)
+    forms: tuple[Form, ...] = ()
+    as_written: AsWritten | None = None
 
 
 @dataclass(frozen=True, eq=False)

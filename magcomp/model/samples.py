@@ -132,11 +132,21 @@ class InForce:
     unseen
         Parameters that act on the readings and of which the recording does not tell the value;
         the firmware's defaults stand for them.
+    exponent
+        The control quantity's parts are raised to it before they are multiplied.
     """
 
     correction: Correction
     regressor: str | None
     unseen: tuple[str, ...] = ()
+    exponent: float = 1.0
+
+    def multiplied(self, u: FloatArray) -> FloatArray:
+        """What the motor vectors multiply at given values of the control quantity, same shape."""
+        if self.exponent == 1.0:
+            return u
+        parts = self.correction.motor.shape[1]
+        return np.asarray(np.maximum(u[:, :parts], 0.0) ** self.exponent)
 
 
 @dataclass(frozen=True, eq=False)

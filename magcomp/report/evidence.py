@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from magcomp.align import controls, readings, reported, sample
+from magcomp.align import controls, currents_of_motors, readings, sample, to_undo
 from magcomp.errors import MissingDataError
 from magcomp.fit import departures, residuals
 from magcomp.geometry import heading
@@ -150,8 +150,9 @@ def compass_plots(
 
 def _samples(recording: Recording, fit: MotorFit, start: float, end: float) -> Samples:
     found = controls(recording)
-    control = _control(found, fit, recording.source)
-    in_force = {**reported(found), control.kind: control}
+    forms = currents_of_motors(recording) if fit.numbers else found
+    control = _control(forms, fit, recording.source)
+    in_force = {**to_undo(recording, found), control.kind: control}
     new = readings(recording, fit.compass, start=start, end=end)
     return sample(new, control, in_force, used_lags(fit))
 

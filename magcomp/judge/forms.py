@@ -1,0 +1,143 @@
+"""Which form the motors' field has: straight in one quantity, curved, or each motor its own.
+
+Each form is a few more columns beside the fitted ones of one current, solved on four fifths of
+the flight and looked at on the last. The simplest form that no other is clearly better than is
+the one to believe (docs/method.md, Motor by motor).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from magcomp.fit import Problem, folds, spread
+from magcomp.fit.field_model import (
+    correction_at,
+    parameters_of,
+    strength_and_dip,
+)
+from magcomp.fit.flight import prior
+from magcomp.fit.nearest import nearest
+from magcomp.fit.robust import spread_of
+from magcomp.geometry import heading_shift
+from magcomp.judge.evidence import used_lags
+from magcomp.model import (
+    MOTORS,
+    BoolArray,
+    Control,
+    Correction,
+    FloatArray,
+    Form,
+    MotorFit,
+    Samples,
+    Series,
+)
+
+CLEARLY = 0.97
+"""A form with more numbers must leave less than this share of what a simpler one leaves unseen."""
+
+MOST = 0.99
+"""Heading errors in flight are those that this share of the readings does not exceed."""
+
+CURVED = "curved current"
+_MOST_FREE = 4
+
+
+@dataclass(frozen=True, eq=False)
+class _Tried:
+    name: str
+    count: int
+    held_out: float
+    added: FloatArray
+    u: FloatArray
+
+
+def forms(
+    problem: Problem,
+    fit: MotorFit,
+    motors: Control | None,
+    others: Sequence[tuple[Problem, MotorFit]],
+) -> tuple[Form, ...]:
+    """Compare what the field may follow, the simplest first.
+
+    Parameters
+    ----------
+    problem, fit
+        A flight and its fit by one current.
+    motors
+        The current of each motor, where known.
+    others
+        The same compass fitted by other quantities.
+    """
+    samples = problem.sample(used_lags(fit))
+    tried = [_tried(fit.regressor, problem, fit)]
+    tried += [_tried(other.regressor, of, other) for of, other in others]
+    tried.append(_tried(CURVED, _curved(problem, samples), fit))
+    if motors is not None:
+        tried.append(_tried(MOTORS, replace(problem, control=motors), fit))
+    best = tried[0]
+    for each in tried[1:]:
+        if each.held_out < CLEARLY * best.held_out:
+            best = each
+    richest = min(tried, key=lambda each: each.held_out)
+    field = fit.correction.apply(samples.raw, samples.u)
+    return tuple(
+        Form(
+            each.name,
+            each.count,
+            each.held_out,
+            np.nan
+            if best is tried[0] or each.name == richest.name
+            else left_deg(nearest(richest.added, each.u)[1], field, samples),
+            is_best=each is best,
+        )
+        for each in tried
+    )
+
+
+def left_deg(left: FloatArray, field: FloatArray, samples: Samples) -> float:
+    """Heading error that a field left over makes in a flight, degrees; see :data:`MOST`."""
+    roll, pitch = samples.attitude[:, 0], samples.attitude[:, 1]
+    return float(np.degrees(np.quantile(np.abs(heading_shift(left, field, roll, pitch)), MOST)))
+
+
+def _curved(problem: Problem, samples: Samples) -> Problem:
+    """The same against the current and its square: bent up, or down where it saturates."""
+    series = problem.control.total
+    top = max(float(np.quantile(samples.total, 0.98)), 1e-9)
+    parts = np.column_stack([series.value, series.value**2 / top])
+    return replace(problem, control=replace(problem.control, series=Series(series.time, parts)))
+
+
+def _tried(name: str, problem: Problem, fit: MotorFit) -> _Tried:
+    """A form solved beside a fit of one quantity, on each part of the flight in turn."""
+    lags = used_lags(fit)
+    samples = problem.sample(lags)
+    start = parameters_of(replace(fit, correction=_begun(fit.correction, name, samples)), lags)
+    values, slopes = strength_and_dip(samples, start)
+    scale = spread_of(values)
+    root = 1.0 / scale / np.sqrt(np.sqrt(1.0 + (values / scale / 2.0) ** 2))
+    known = prior(problem, _MOST_FREE)
+    precision = np.diag(np.where(known.width > 0.0, known.precision, 1e12))
+
+    def solved(rows: BoolArray) -> FloatArray:
+        flat = (slopes[rows] * root[rows][:, :, None]).reshape(-1, slopes.shape[2])
+        left = (values[rows] * root[rows]).reshape(-1)
+        return np.asarray(-np.linalg.solve(flat.T @ flat + precision, flat.T @ left))
+
+    fold = folds(samples.time)
+    parts = [fold == index for index in np.unique(fold) if np.any(fold != index)]
+    unseen = np.concatenate([values[here] + slopes[here] @ solved(~here) for here in parts])
+    found = correction_at(start + solved(np.ones(len(samples), dtype=bool)))
+    return _Tried(name, found.motor.size, spread(unseen), found.added(samples.u), samples.u)
+
+
+def _begun(correction: Correction, name: str, samples: Samples) -> Correction:
+    """A correction of as many parts as the samples have, which corrects as the given one does."""
+    parts = samples.u.shape[1]
+    vectors = np.tile(correction.vector[:, None], parts)
+    if name == CURVED:
+        vectors[:, 1:] = 0.0
+    return replace(correction, motor=vectors)
