@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 
@@ -11,10 +10,11 @@ from magcomp.align.control import POWERS, duty_of, rebuild, reported, smoothed
 from magcomp.align.sample import interpolate
 from magcomp.model import DRIVE, MOTORS, Control, Recording, Series
 
-SMOOTHINGS_S = (0.0, 0.04, 0.08)
+SMOOTHINGS_S = (0.0, 0.05)
 """Time constants with which a motor may follow its output; the fit decides."""
 
 _LEAST_MOTORS = 2
+_LEAST_A = 1e-3
 
 
 def currents_of_motors(recording: Recording) -> tuple[Control, ...]:
@@ -23,9 +23,9 @@ def currents_of_motors(recording: Recording) -> tuple[Control, ...]:
     Returns
     -------
     tuple of Control
-        Parts of shape (n, k), in A, that add up to the battery's current: the same with different
-        time constants. Empty where the recording lacks the current or the outputs of two motors,
-        or the one does not follow the other.
+        Parts of shape (n, k), in A, that add up to the battery's current: as it is reported and as
+        the outputs tell it, with different time constants. Empty where the recording lacks the
+        current or the outputs of two motors, or the one does not follow the other.
 
     Notes
     -----
@@ -35,23 +35,30 @@ def currents_of_motors(recording: Recording) -> tuple[Control, ...]:
     duty = duty_of(recording)
     if recording.current is None or duty is None or len(duty.numbers) < _LEAST_MOTORS:
         return ()
-    name = "battery current, shared out by the motor outputs"
-    found = rebuild(recording.current, duty.series, MOTORS, name)
+    found = rebuild(recording.current, duty.series, MOTORS, "battery current")
     if found is None:
         return ()
     level, *slopes = found.coefficients
     curved = sum(
         slope * duty.series.value**power for slope, power in zip(slopes, POWERS, strict=True)
     )
-    each = (level + curved + found.trend[:, None]) / len(duty.numbers)
-    series = Series(found.control.series.time, np.maximum(each, 0.0))
-    made = replace(found.control, series=series, numbers=duty.numbers)
+    each = np.maximum((level + curved) / len(duty.numbers), 0.0)
+    time = found.control.series.time
+    # The battery sags for all motors alike: what outputs do not explain is shared in proportion.
+    share = each / np.maximum(each.sum(axis=1, keepdims=True), _LEAST_A)
+    totals = {
+        "as the outputs tell it": found.control.series.value,
+        "as reported": interpolate(recording.current, time),
+    }
     return tuple(
-        replace(
-            made,
-            series=smoothed(series, constant),
-            origin=f"{name}, which each motor follows within {1000 * constant:.0f} ms",
+        Control(
+            MOTORS,
+            smoothed(Series(time, share * total[:, None]), constant),
+            f"battery current {how}, shared out by the motor outputs, which each motor follows "
+            f"within {1000 * constant:.0f} ms",
+            duty.numbers,
         )
+        for how, total in totals.items()
         for constant in SMOOTHINGS_S
     )
 

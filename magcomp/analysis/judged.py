@@ -128,7 +128,7 @@ def compare(
             (one.problem, one.fit) for kind, one in kinds.items() if kind not in (CURRENT, MOTORS)
         ]
         of_motors = kinds[MOTORS].problem.control if MOTORS in kinds else None
-        control = of_motors or (motors[len(motors) // 2] if motors else None)
+        control = of_motors or (motors[0] if motors else None)
         found[compass] = forms(base.problem, base.fit, control, others)
     return found
 

@@ -143,10 +143,10 @@ class InForce:
 
     def multiplied(self, u: FloatArray) -> FloatArray:
         """What the motor vectors multiply at given values of the control quantity, same shape."""
-        if self.exponent == 1.0:
+        if u.ndim == 1:
             return u
-        parts = self.correction.motor.shape[1]
-        return np.asarray(np.maximum(u[:, :parts], 0.0) ** self.exponent)
+        parts = u[:, : self.correction.motor.shape[1]]
+        return np.asarray(np.maximum(parts, 0.0) ** self.exponent)
 
 
 @dataclass(frozen=True, eq=False)
