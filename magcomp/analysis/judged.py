@@ -137,26 +137,34 @@ def forms_notes(
     compared: Mapping[int, tuple[Form, ...]], judged: Mapping[str, list[Judged]], chosen: str
 ) -> Iterable[str]:
     """What the comparison says that the chosen form does not have."""
+    better: dict[str, list[tuple[int, Form, Form]]] = {}
     for compass, tried in compared.items():
         best = next(form for form in tried if form.is_best)
         now = next((form for form in tried if form.name == chosen), tried[0])
-        if best.count <= now.count:
-            continue
-        leaves = f"leaves {best.held_out:.1f} instead of {now.held_out:.1f} mGauss unexplained"
-        costs = f", and up to {now.left_deg:.1f}° of heading are left in this flight"
-        costs = costs if np.isfinite(now.left_deg) else ""
-        if best.name == MOTORS:
+        if best.count > now.count:
+            better.setdefault(best.name, []).append((compass, best, now))
+    for name, found in better.items():
+        whose = "compass " + ", ".join(str(compass) for compass, _, _ in found)
+        leaves = (
+            f"leaves {_listed(best.held_out for _, best, _ in found)} instead of "
+            f"{_listed(now.held_out for _, _, now in found)} mGauss on unseen data"
+        )
+        costs = f"up to {_listed(now.left_deg for _, _, now in found)}° of heading in this flight"
+        if name == MOTORS:
             yield (
-                f"the motors disturb compass {compass} unequally: motor by motor {leaves} on "
-                f"unseen data{costs}; fit with --regressor motors"
+                f"the motors disturb {whose} unequally: motor by motor {leaves}, and one {chosen} "
+                f"costs {costs}; fit with --regressor motors"
             )
         else:
-            bound = next(j for j in judged[chosen] if j.fit.compass == compass).fit
-            quantity = quantity_of(bound.regressor)
-            low, high = quantity.scale * bound.u_low, quantity.text(bound.u_high)
+            fit = next(j.fit for j in judged[chosen] if j.fit.compass == found[0][0])
+            quantity = quantity_of(fit.regressor)
             yield (
-                f"what disturbs compass {compass} bends with the {bound.regressor}: a curve "
-                f"{leaves} on unseen data; the straight value fitted here is the best one from "
-                f"{low:.0f} to {high}{costs}: fly near that range, or move the compass away from "
-                "the wires"
+                f"what disturbs {whose} bends with the {chosen}: a curve {leaves}; the straight "
+                f"value fitted here is the best one from {quantity.scale * fit.u_low:.0f} to "
+                f"{quantity.text(fit.u_high)} and costs {costs}: fly in that range, or move the "
+                "compass away from the wires"
             )
+
+
+def _listed(values: Iterable[float]) -> str:
+    return "/".join(f"{value:.1f}" for value in values)

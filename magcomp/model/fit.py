@@ -194,6 +194,17 @@ class MotorFit:
         return np.asarray(np.sqrt(np.diag(self.shared_covariance)[MOTOR]))
 
     @property
+    def by_motor(self) -> tuple[tuple[int, FloatArray, FloatArray], ...]:
+        """Number of each motor, what it adds, mGauss per unit, (3,), and its standard errors."""
+        std = np.sqrt(np.diag(self.covariance))
+        each = np.vstack([std[MOTOR], std[CORRECTION_SIZE:].reshape(-1, 3)])
+        return (
+            tuple(zip(self.numbers, -self.correction.motor.T, each, strict=True))
+            if (self.numbers)
+            else ()
+        )
+
+    @property
     def shared_covariance(self) -> FloatArray:
         """Covariance where all parts share the total alike, shape (12, 12).
 
