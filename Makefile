@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 
-.PHONY: demo test test-all coverage check lint lock benchmark clean
+.PHONY: demo test test-all coverage check lint lock benchmark docs pictures release clean
 
 demo: $(VENV)/installed
 	@$(BIN)/magcomp demo
@@ -28,7 +28,7 @@ check: lint
 
 # Needs uv. The lock is what hosted CI installs; `make test` takes what pyproject.toml allows.
 lock:
-	@uv pip compile pyproject.toml --extra dev --extra fleet --universal --python-version 3.11 --generate-hashes \
+	@uv pip compile pyproject.toml --extra dev --extra fleet --extra docs --extra release --universal --python-version 3.11 --generate-hashes \
 	  --no-annotate --quiet -o requirements-dev.lock
 
 benchmark: $(VENV)/installed-dev
@@ -37,6 +37,28 @@ benchmark: $(VENV)/installed-dev
 	@$(BIN)/python benchmarks/read.py
 	@$(BIN)/python benchmarks/fit_time.py
 	@$(BIN)/python benchmarks/fleet.py
+
+# The site, with every page of docs/ and the API, into build/docs; a link that leads nowhere fails.
+docs: $(VENV)/installed
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[docs]'
+	@$(BIN)/python -m sphinx -E -W --keep-going -q -b html docs build/docs
+	@echo "build/docs/index.html"
+
+# Wheel, sdist, and what the wheel brings along (CycloneDX), into dist/.
+release: $(VENV)/installed
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[release]'
+	@rm -rf dist build/fresh
+	@$(BIN)/python -m build --outdir dist .
+	@$(PYTHON) -m venv build/fresh
+	@build/fresh/bin/python -m pip install --quiet --disable-pip-version-check dist/magcomp-*.whl
+	@$(BIN)/cyclonedx-py environment --pyproject pyproject.toml --output-reproducible \
+	  -o dist/magcomp.cdx.json build/fresh/bin/python
+	@ls dist
+
+# Every picture of README.md and docs/ that shows what the program prints or draws; a vehicle flies.
+pictures: $(VENV)/installed
+	@$(BIN)/python docs/session.py
+	@$(BIN)/python docs/pictures.py
 
 $(VENV)/bin/python:
 	@$(PYTHON) -c 'import sys; sys.exit("magcomp needs Python 3.11 or newer") if sys.version_info < (3, 11) else None'
@@ -53,4 +75,4 @@ $(VENV)/installed-dev: pyproject.toml | $(VENV)/bin/python
 	@touch $(VENV)/installed $@
 
 clean:
-	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .import_linter_cache
+	rm -rf $(VENV) build dist .mypy_cache .ruff_cache .pytest_cache .import_linter_cache

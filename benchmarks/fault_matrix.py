@@ -1,42 +1,50 @@
 """What stands on a vehicle after a write that went wrong: every message × every fault.
 
-A simulated vehicle with two memories (what is in force; what a reboot brings back, into which
-writes go late and in any order) is written by the client that writes real ones. At each message of
-the write in turn, or each STEP-th, one thing goes wrong. Counted are:
+A simulated vehicle of each firmware, with two memories (what is in force; what a reboot brings
+back) is written by the client that writes real ones. At each message of the write in turn, or each
+STEP-th, one thing goes wrong. Counted are:
 
 half-written
-    Some instant at which compensation was on with values that are neither all old nor all new.
+    Some instant at which compensation was on with values that are neither all old nor all new; with
+    PX4, which takes values over some time after they are written, also of those in force.
 false claims
     Outcome or journal said something that was not so.
 not restored
     `restore` did not bring every value back.
 
-PX4 is the small one of the tests (tests/writing/fake_px4.py), which holds and saves parameters as
-PX4 does.
-
-    python benchmarks/fault_matrix.py [STEP]
+    python benchmarks/fault_matrix.py [STEP [ardupilot|px4]]
 """
 
 from __future__ import annotations
 
 import contextlib
-import importlib
 import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from unittest import mock
 
+from magcomp.autopilots.px4_names import vector_names
 from magcomp.link.identity import read_heartbeat
 from magcomp.mavlink.version import unique_id
 from magcomp.model import ParameterSet, compasses_of
 from magcomp.model import Vehicle as Identity
-from magcomp.simulate import Faults, FaultyLink, Frame, Habits, LocalConnection, Vehicle, scenario
+from magcomp.simulate import (
+    Faults,
+    FaultyLink,
+    Frame,
+    Habits,
+    LocalConnection,
+    Vehicle,
+    parameters,
+    scenario,
+)
 from magcomp.simulate.habits import own_number
-from magcomp.simulate.parameters import DEVICE_IDS
+from magcomp.simulate.px4 import Px4, sensors
 from magcomp.writing import writer
 from magcomp.writing.events import Outcome, Standing
 from magcomp.writing.files import read_parameter_file
@@ -46,27 +54,72 @@ from magcomp.writing.rows import as_float32
 
 SEED = 1
 STORAGE_S = 0.9
-TESTS = Path(__file__).resolve().parent.parent / "tests" / "writing"
 TITLE = (
     f"{'fault':<32}{'cases':>6}{'half-written':>14}{'false claims':>14}{'not restored':>14}"
     f"{'old/new/off':>16}{'longest':>9}"
 )
-NAMES = [
-    f"COMPASS_{kind}{compass}_{axis}"
-    for compass in ("", "2", "3")
-    for kind in ("OFS", "DIA", "ODI", "MOT")
-    for axis in "XYZ"
-]
-SWITCH = "COMPASS_MOTCT"
-IDENTITY = Identity(
+
+
+@dataclass(frozen=True)
+class Firmware:
+    """Whose vehicle is written.
+
+    Attributes
+    ----------
+    key
+        As in ``Vehicle.autopilot``.
+    names
+        The values that are written, without the switch.
+    switch
+        The parameter that switches compensation.
+    identity
+        Whom the client expects.
+    """
+
+    key: str
+    names: tuple[str, ...]
+    switch: str
+    identity: Identity
+
+    def parked(self, habits: Habits, *, answers_errors: bool = False) -> Vehicle:
+        """A vehicle on the ground with a compensation in force."""
+        return Vehicle(
+            scenario("parked", SEED, compensation="wrong"),
+            autopilot=self.key,
+            habits=habits,
+            answers_errors=answers_errors,
+        )
+
+
+def identity(key: str, firmware: str, devices: Sequence[int]) -> Identity:
+    """Whom the client expects."""
+    number = unique_id(own_number(SEED), 0)
+    return Identity(key, "copter", 1, 1, firmware, compasses_of(devices), uid=number)
+
+
+ARDUPILOT = Firmware(
     "ardupilot",
-    "copter",
-    1,
-    1,
-    "4.6.3",
-    compasses_of(DEVICE_IDS),
-    uid=unique_id(own_number(SEED), 0),
+    tuple(
+        f"COMPASS_{kind}{compass}_{axis}"
+        for compass in ("", "2", "3")
+        for kind in ("OFS", "DIA", "ODI", "MOT")
+        for axis in "XYZ"
+    ),
+    "COMPASS_MOTCT",
+    identity("ardupilot", "4.6.3", parameters.DEVICE_IDS),
 )
+PX4 = Firmware(
+    "px4",
+    tuple(
+        f"CAL_MAG{slot}_{axis}{kind}"
+        for slot in range(3)
+        for kind in ("COMP", "OFF", "SCALE", "ODIAG")
+        for axis in "XYZ"
+    ),
+    "CAL_MAG_COMP_TYP",
+    identity("px4", "1.15.2", sensors.DEVICE_IDS),
+)
+FIRMWARE = {each.key: each for each in (ARDUPILOT, PX4)}
 
 Held = dict[str, float]
 
@@ -82,8 +135,8 @@ class CallbackError(Exception):
 class Watched:
     """A machine that looks at the vehicle behind it after each frame it gets."""
 
-    def __init__(self, machine: Any, vehicle: Vehicle) -> None:
-        self._machine, self._vehicle = machine, vehicle
+    def __init__(self, machine: Any, vehicle: Vehicle, firmware: Firmware) -> None:
+        self._machine, self._vehicle, self._firmware = machine, vehicle, firmware
         self.states: list[Held] = []
 
     def receive(self, frame: bytes, time: float) -> None:
@@ -98,21 +151,32 @@ class Watched:
         return frames
 
     def _look(self) -> None:
-        now = held(self._vehicle)
-        if not self.states or now != self.states[-1]:
-            self.states.append(now)
+        for now in (held(self._vehicle, self._firmware), in_force(self._vehicle, self._firmware)):
+            if now not in self.states[-2:]:
+                self.states.append(now)
 
 
-def held(vehicle: Vehicle) -> Held:
-    return {name: vehicle.parameters[name] for name in (*NAMES, SWITCH)}
+def held(vehicle: Vehicle, firmware: Firmware) -> Held:
+    """What the vehicle holds."""
+    return {name: vehicle.parameters[name] for name in (*firmware.names, firmware.switch)}
 
 
-def parked(habits: Habits, *, answers_errors: bool = False) -> Vehicle:
-    return Vehicle(
-        scenario("parked", SEED, compensation="wrong"),
-        habits=habits,
-        answers_errors=answers_errors,
-    )
+def in_force(vehicle: Vehicle, firmware: Firmware) -> Held:
+    """What acts on its readings, as the values that would make it so."""
+    if not isinstance(vehicle.firmware, Px4):
+        return held(vehicle, firmware)
+    found: Held = {}
+    for slot, device in enumerate(sensors.DEVICE_IDS):
+        acting = vehicle.firmware.compasses.in_force(device)
+        found[firmware.switch] = float(acting.compensation)
+        for kind, vector in (
+            ("COMP", acting.motor),
+            ("OFF", acting.offset),
+            ("SCALE", acting.scale),
+            ("ODIAG", acting.off_diagonal),
+        ):
+            found |= dict(zip(vector_names(kind, slot + 1), vector.tolist(), strict=True))
+    return {name: found[name] for name in (*firmware.names, firmware.switch)}
 
 
 class Case:
@@ -120,6 +184,7 @@ class Case:
 
     def __init__(
         self,
+        firmware: Firmware,
         faults: Faults,
         folder: Path,
         at: int = 0,
@@ -129,18 +194,22 @@ class Case:
         answers_errors: bool = False,
         seed: int = 0,
     ) -> None:
-        self.vehicle = parked(habits or Habits(storage_s=STORAGE_S), answers_errors=answers_errors)
-        self.old = held(self.vehicle)
-        self.new = {n: as_float32(self.old[n] + 0.0625) for n in NAMES} | {SWITCH: 1.0}
+        self.firmware = firmware
+        self.vehicle = firmware.parked(
+            habits or Habits(storage_s=STORAGE_S), answers_errors=answers_errors
+        )
+        self.old = self._held()
+        moved = {name: as_float32(self.old[name] + 0.0625) for name in firmware.names}
+        self.new = moved | {firmware.switch: 1.0}
         self.backup = folder / "backup.param"
         self.outcome: Outcome | None = None
         self.counted = 0
         calm = LocalConnection(self.vehicle)
-        wanted = ParameterSet(self.new, IDENTITY)
-        current = writer.read_current(calm, IDENTITY, wanted, clock=calm.clock)
-        self.plan = plan(current, wanted, IDENTITY)
+        wanted = ParameterSet(self.new, firmware.identity)
+        current = writer.read_current(calm, firmware.identity, wanted, clock=calm.clock)
+        self.plan = plan(current, wanted, firmware.identity)
         link = FaultyLink(self.vehicle, faults, seed)
-        self.watched = Watched(link, self.vehicle)
+        self.watched = Watched(link, self.vehicle, firmware)
         connection = LocalConnection(self.watched, calm.clock())
         messages = _Counter(connection, at if kind == "killed" else 0)
         told = _Teller(at if kind == "callback" else 0)
@@ -155,12 +224,15 @@ class Case:
             self.vehicle.reboot()
         self._after = connection.clock() + 5.0
 
+    def _held(self) -> Held:
+        return held(self.vehicle, self.firmware)
+
     def verdict(self) -> tuple[bool, bool, bool, str]:
         """Half-written, false claim, not restored; and how it stands in a word."""
         whole = (self.old, self.new)
-        now = held(self.vehicle)
+        now = self._held()
         states = [*self.watched.states, now]
-        half = any(state[SWITCH] and state not in whole for state in states)
+        half = any(state[self.firmware.switch] and state not in whole for state in states)
         journal = read_journal(self.backup)
         false = not self._is_so(journal.standing, now)
         if self.outcome is not None:
@@ -172,19 +244,19 @@ class Case:
         return {
             Standing.OLD: now == self.old,
             Standing.NEW: now == self.new,
-            Standing.OFF: now[SWITCH] == 0.0,
-            Standing.UNSURE: now in (self.old, self.new) or now[SWITCH] == 0.0,
+            Standing.OFF: now[self.firmware.switch] == 0.0,
+            Standing.UNSURE: now in (self.old, self.new) or now[self.firmware.switch] == 0.0,
         }[standing]
 
     def _restored(self) -> bool:
         self.vehicle.advance(self._after)
         self.vehicle.disarm()
         calm = LocalConnection(self.vehicle, self._after)
-        wanted = read_parameter_file(self.backup)
-        current = writer.read_current(calm, IDENTITY, wanted, clock=calm.clock)
+        wanted, identity = read_parameter_file(self.backup), self.firmware.identity
+        current = writer.read_current(calm, identity, wanted, clock=calm.clock)
         again = self.backup.with_name("again.param")
-        writer.write(plan(current, wanted, IDENTITY), calm, backup=again, clock=calm.clock)
-        return held(self.vehicle) == self.old
+        writer.write(plan(current, wanted, identity), calm, backup=again, clock=calm.clock)
+        return self._held() == self.old
 
 
 class _Counter:
@@ -237,29 +309,10 @@ KINDS: dict[str, Callable[[int], tuple[Faults, str]]] = {
 
 def main() -> None:
     step = int(sys.argv[1]) if len(sys.argv) > 1 else 10
+    chosen = sys.argv[2:] or [*FIRMWARE]
     with mock.patch("os.fsync"):  # the disk is not what is measured
-        measure(step)
-        measure_px4(step)
-
-
-def measure_px4(step: int) -> None:
-    """Put the faults to the PX4 of the tests."""
-    sys.path.insert(0, str(TESTS))
-    faults = importlib.import_module("px4_faults")  # in the folder of the tests
-    messages, seconds = faults.clean_messages()
-    print(f"PX4: {messages} messages, {seconds:.1f} s clean")
-    print(TITLE)
-    for kind, fault in faults.FAULTS.items():
-        begun, counts, longest = time.monotonic(), [0, 0, 0], 0.0
-        stood: Counter[str] = Counter()
-        cases = range(0, messages, step)
-        for at in cases:
-            with tempfile.TemporaryDirectory() as name:
-                case = faults.strike(fault, at, Path(name))
-            counts = [count + one for count, one in zip(counts, case.bad, strict=True)]
-            stood[case.stands] += 1
-            longest = max(longest, case.seconds)
-        tell(kind, len(cases), counts, stood, longest, time.monotonic() - begun)
+        for key in chosen:
+            measure(FIRMWARE[key], step)
 
 
 def tell(
@@ -274,10 +327,11 @@ def tell(
     )
 
 
-def measure(step: int) -> None:
+def measure(firmware: Firmware, step: int) -> None:
     with tempfile.TemporaryDirectory() as name:
-        clean = Case(Faults(), Path(name))
-    print(f"ArduPilot: {clean.counted} messages, {clean.told} events, {clean.seconds:.1f} s clean")
+        clean = Case(firmware, Faults(), Path(name))
+    size = f"{clean.counted} messages, {clean.told} events, {clean.seconds:.1f} s"
+    print(f"{firmware.key}: {size} clean")
     print(TITLE)
     for kind, made in KINDS.items():
         begun, counts, longest = time.monotonic(), [0, 0, 0], 0.0
@@ -287,7 +341,7 @@ def measure(step: int) -> None:
         for at in cases:
             faults, how = made(at)
             with tempfile.TemporaryDirectory() as name:
-                case = Case(faults, Path(name), at, how)
+                case = Case(firmware, faults, Path(name), at, how)
                 *bad, word = case.verdict()
             counts = [count + one for count, one in zip(counts, bad, strict=True)]
             stood[word] += 1

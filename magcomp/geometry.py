@@ -155,3 +155,22 @@ def heading_shift(
     still = np.einsum("...ij,...j->...i", level, np.asarray(field, float))
     horizontal = still[..., 0] ** 2 + still[..., 1] ** 2
     return np.asarray((still[..., 1] * shift[..., 0] - still[..., 0] * shift[..., 1]) / horizontal)
+
+
+def apart(path: ArrayLike, other: ArrayLike) -> float:
+    """How far a path strays from another: the largest distance of its points from the other's.
+
+    Parameters
+    ----------
+    path, other
+        Points, any unit, shapes (n, k) and (m, k).
+
+    Examples
+    --------
+    >>> apart([[0.0, 0.0], [3.0, 5.0]], [[0.0, 0.0], [0.0, 1.0]])
+    5.0
+    """
+    from scipy.spatial import cKDTree  # noqa: PLC0415 -- slow to import, and seldom needed
+
+    nearest, _ = cKDTree(np.asarray(other, float)).query(np.asarray(path, float))
+    return float(np.max(nearest))

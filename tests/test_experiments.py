@@ -7,6 +7,8 @@ from functools import cache
 
 import numpy as np
 import pytest
+from browser_checks import assert_clean, axe_findings, clipped_labels, show
+from chromium import chromium_page, find_chromium
 from truth import FIXTURES
 
 from magcomp.cli.app import run
@@ -93,11 +95,24 @@ def test_in_flight_compensation_brings_the_heading_within_the_papers_3_degrees(t
 
 def test_the_page_needs_nothing_from_elsewhere(written):
     page = (written / "index.html").read_text()
-    assert len(page) < 6_000_000
+    assert len(page) < 5_000_000
     assert not re.search(r"<(?:script|link|img|iframe)[^>]+(?:src|href)=", page)
     for kind in KINDS:
         for number in range(3, 10):
             assert f'id="fig{number}-{kind}"' in page
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(find_chromium() is None, reason="no Chromium on this machine")
+def test_the_page_stands_up_in_a_browser(written, tmp_path):
+    page = written / "index.html"
+    with chromium_page(tmp_path) as browser:
+        for width in (1280, 390):
+            show(browser, page, width)
+            assert_clean(browser, page)
+            assert clipped_labels(browser) == []
+            assert browser.evaluate("document.documentElement.scrollWidth") <= width
+            assert axe_findings(browser) == []
 
 
 def test_the_pages_numbers_are_those_of_the_table(written, table):

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from magcomp.cli.app import COMMANDS
+from magcomp.cli.app import COMMANDS, run
 from magcomp.writing.files import SUFFIXES
 
 ROOT = Path(__file__).parents[1]
@@ -29,6 +29,19 @@ def test_the_python_example_runs(
     assert "mGauss per A" in lines[0]
     assert lines[-1] == "2.0"
     assert all("° now, at most" in line for line in lines[1:-1])
+
+
+@pytest.mark.slow
+def test_the_first_answer_is_what_fit_prints(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "sitl_fixtures").symlink_to(ROOT / "sitl_fixtures")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "80")
+    (command, shown) = re.findall(r"    \$ magcomp (.+)\n\n((?:    .*\n|\n)+)", README)[0]
+    run(command.split())
+    printed = capsys.readouterr().out.splitlines()
+    assert [line[4:] for line in shown.rstrip().splitlines()] == printed
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda path: path.name)

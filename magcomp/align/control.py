@@ -17,7 +17,7 @@ import numpy as np
 from magcomp import autopilots
 from magcomp.align.low_pass import low_pass
 from magcomp.align.sample import interpolate
-from magcomp.autopilots.protocol import MotorOutputs
+from magcomp.autopilots.terms import MotorOutputs
 from magcomp.model import (
     CURRENT,
     SPEED_CONTROLLERS,

@@ -26,6 +26,9 @@ PARAMETER_SETTLE_S = 1.5
 ARMED_ENOUGH_S = 30.0
 """With this much armed time, disarmed time (carried about, parked on steel) is left out."""
 
+SHORT_PAUSE_S = 6.0
+"""A pause between two armed stretches in which nobody carries a vehicle about: of motor tests."""
+
 
 MOST_READINGS = 20_000
 """Half an hour at 10 Hz. More are thinned before a fit: the bound of an hour's flight is that of
@@ -204,9 +207,20 @@ def _usable_state(time: FloatArray, armed: Series | None) -> BoolArray:
     everything = np.ones(len(time), dtype=bool)
     if armed is None or len(armed) < 2:
         return everything
-    state = armed.value[np.clip(np.searchsorted(armed.time, time, "right") - 1, 0, None)] > 0.5
+    is_armed = _with_short_pauses(armed)
+    state = is_armed[np.clip(np.searchsorted(armed.time, time, "right") - 1, 0, None)]
     seconds = float(np.sum(np.diff(armed.time) * armed.value[:-1]))
     return np.asarray(state) if seconds >= ARMED_ENOUGH_S and state.any() else everything
+
+
+def _with_short_pauses(armed: Series) -> BoolArray:
+    """Whether each state counts as armed: it is, or pauses shortly between two that are."""
+    is_armed = armed.value > 0.5
+    edges = np.flatnonzero(np.diff(is_armed)) + 1
+    begin = np.concatenate([[-np.inf], armed.time[edges]])
+    end = np.concatenate([armed.time[edges], [np.inf]])
+    short = end - begin <= SHORT_PAUSE_S
+    return np.asarray(is_armed | short[np.searchsorted(edges, np.arange(len(armed)), "right")])
 
 
 def _mend_truncation(value: FloatArray) -> FloatArray:

@@ -29,6 +29,7 @@ from magcomp.analysis.judged import (
 )
 from magcomp.analysis.motor_by_motor import Answer, as_written
 from magcomp.analysis.multiplied import kinds_to_try, why_only_to_look_at
+from magcomp.analysis.origin import hints
 from magcomp.analysis.vehicle_words import in_words_of
 from magcomp.earth import EarthField
 from magcomp.errors import MissingDataError, UsageError
@@ -176,6 +177,7 @@ def analyse(
             *notes_of(recording, wanted.compass, judged, chosen),
             *forms_notes(compared, judged, chosen),
             *lacking_notes(lacking, judged),
+            *hints([each.judged.fit for each in answers]),
         ),
         only_to_look_at=why_not,
     )

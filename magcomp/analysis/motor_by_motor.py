@@ -10,7 +10,7 @@ import numpy as np
 from magcomp import autopilots
 from magcomp.align import drive_of_motors, interpolate
 from magcomp.analysis.judged import Judged
-from magcomp.autopilots.protocol import MotorLaw
+from magcomp.autopilots.terms import MotorLaw
 from magcomp.fit.nearest import moved, nearest
 from magcomp.judge.evidence import used_lags
 from magcomp.judge.finding import severity

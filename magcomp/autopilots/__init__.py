@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from magcomp.autopilots.ardupilot import ArduPilot
-from magcomp.autopilots.protocol import Autopilot, Kind, ParameterName
+from magcomp.autopilots.protocol import Autopilot
 from magcomp.autopilots.px4 import Px4
+from magcomp.autopilots.terms import Kind, ParameterName
 from magcomp.errors import MissingDataError
 from magcomp.model import Recording, Vehicle
 

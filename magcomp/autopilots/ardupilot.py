@@ -38,7 +38,8 @@ from magcomp.autopilots.ardupilot_names import (
     suffix,
     vector_names,
 )
-from magcomp.autopilots.protocol import (
+from magcomp.autopilots.motor_test import ArduPilotMotorTest
+from magcomp.autopilots.terms import (
     FieldMeaning,
     Kind,
     LagPrior,
@@ -72,6 +73,7 @@ _CURVE_NAMES = ("MOT_THST_EXPO", "MOT_SPIN_MIN", "MOT_SPIN_MAX")
 _PWM_NAMES = ("MOT_PWM_MIN", "MOT_PWM_MAX")
 _TOLD_PER_READING = (Kind.OFFSET, Kind.MOTOR, Kind.PER_MOTOR)
 
+_OTHER_COMPASSES = ("SCALED_IMU2", "SCALED_IMU3")
 _LINK = LagPriors(LagPrior(0.08, 0.1), LagPrior(0.08, 0.1))
 """A reading is the mean over one update of 0.1 s, and waits for the stream that sends it."""
 
@@ -124,6 +126,7 @@ class ArduPilot:
     first_slot_leads = True
     first_compass_message = "RAW_IMU"
     storage_s = 1.0  # a queue of writes, each soon, and the memory's lines after it
+    motor_test = ArduPilotMotorTest()
     device_ids_describe = "bus, address and type of a sensor, which are alike in vehicles of a kind"
 
     def require_fittable(self, recording: Recording) -> None:
@@ -139,6 +142,10 @@ class ArduPilot:
         recording flight_wrong_mot shows it).
         """
         return FieldMeaning(truncated=True, applied_later_s=0.05)
+
+    def compass_messages(self, values: Mapping[str, float]) -> Mapping[int, str]:  # noqa: ARG002
+        """Each message carries the compass of its number, by priority."""
+        return dict(enumerate((self.first_compass_message, *_OTHER_COMPASSES), start=1))
 
     def from_telemetry(
         self,
@@ -337,10 +344,10 @@ class ArduPilot:
         return tuple(ardupilot_settings.warnings(values))
 
     def write_warnings(
-        self, asked: Mapping[str, float], values: Mapping[str, float]
+        self, asked: Mapping[str, float], held: Mapping[str, float]
     ) -> tuple[str, ...]:
         """Of vectors without their switch."""
-        return tuple(ardupilot_settings.write_warnings(asked, values))
+        return tuple(ardupilot_settings.write_warnings(asked, held))
 
     def multiplied(self, vehicle: Vehicle) -> tuple[str, ...]:
         """The current; in copters and subs, which hand it to the compass, the throttle too."""
@@ -350,6 +357,10 @@ class ArduPilot:
         """A bit of LOG_BITMASK for its own log, a message for telemetry."""
         asked = _LOG_BITS if source_format == "dataflash" else _LINK_MESSAGES
         return asked[quantity]
+
+    def link_notes(self, compasses: int) -> tuple[str, ...]:  # noqa: ARG002
+        """None: each message says whose it is."""
+        return ()
 
     def reading_notes(self, recording: Recording) -> tuple[str, ...]:  # noqa: ARG002
         """None: the messages say what they are."""

@@ -27,7 +27,7 @@ from magcomp.autopilots.ardupilot_names import (
     single_name,
     vector_names,
 )
-from magcomp.autopilots.protocol import Kind
+from magcomp.autopilots.terms import Kind
 from magcomp.errors import ParameterFileError
 from magcomp.model import CURRENT, THROTTLE, Correction, InForce, ParameterHistory
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-from magcomp.autopilots.protocol import Kind, ParameterName
+from magcomp.autopilots.terms import Kind, ParameterName
 
 COMPASS_COUNT = 3
 NUMBERS = range(1, COMPASS_COUNT + 1)

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from magcomp.autopilots.ardupilot_names import AXES, PER_MOTOR_SWITCH
-from magcomp.autopilots.protocol import MotorLaw
+from magcomp.autopilots.terms import MotorLaw
 from magcomp.model import DRIVE, FloatArray, InForce, ParameterHistory
 
 EXPONENT = "COMPASS_PMOT_EXP"

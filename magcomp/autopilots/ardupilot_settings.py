@@ -23,7 +23,7 @@ from magcomp.autopilots.ardupilot_names import (
     single_name,
     vector_names,
 )
-from magcomp.autopilots.protocol import Kind
+from magcomp.autopilots.terms import Kind
 from magcomp.errors import InputError
 from magcomp.model import Compass, ParameterHistory
 
@@ -127,8 +127,9 @@ def _long_offset(values: Mapping[str, float], number: int) -> Iterator[str]:
         )
 
 
-def write_warnings(asked: Mapping[str, float], values: Mapping[str, float]) -> Iterator[str]:
+def write_warnings(asked: Mapping[str, float], held: Mapping[str, float]) -> Iterator[str]:
     """What a pilot must know of a write besides."""
+    values = {**held, **asked}
     vectors = any(
         value and (found := parse(name)) is not None and found.kind in (Kind.MOTOR, Kind.PER_MOTOR)
         for name, value in asked.items()

@@ -8,170 +8,26 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
-from enum import IntEnum
 from typing import Protocol
 
-import numpy as np
-
+from magcomp.autopilots.motor_test import MotorTest
+from magcomp.autopilots.terms import (
+    FieldMeaning,
+    LagPriors,
+    MotorLaw,
+    MotorOutputs,
+    ParameterName,
+)
 from magcomp.errors import InputError
 from magcomp.model import (
     Compass,
     Correction,
-    FloatArray,
     InForce,
     ParameterHistory,
     Recording,
     Series,
     Vehicle,
 )
-
-
-class Kind(IntEnum):
-    """What a compass parameter is, in the order in which a table shows them."""
-
-    SWITCH = 0
-    MOTOR = 1
-    OFFSET = 2
-    DIAGONAL = 3
-    OFF_DIAGONAL = 4
-    SCALE = 5
-    PER_MOTOR = 6
-    DEVICE = 7
-    SETTING = 8
-
-    @property
-    def is_value(self) -> bool:
-        """A calibration value: written, and not a switch."""
-        return Kind.MOTOR <= self <= Kind.PER_MOTOR
-
-
-@dataclass(frozen=True)
-class ParameterName:
-    """A compass parameter's name, taken apart.
-
-    Attributes
-    ----------
-    kind
-        What it is.
-    compass
-        1, 2, …; 0 where it serves all compasses.
-    vector
-        The name without its axis.
-    axis
-        ``"X"``, ``"Y"`` or ``"Z"``; empty where it is no part of a vector.
-    """
-
-    kind: Kind
-    compass: int
-    vector: str
-    axis: str = ""
-
-
-@dataclass(frozen=True)
-class FieldMeaning:
-    """What a source's compass readings are.
-
-    Attributes
-    ----------
-    truncated
-        Cut towards zero to whole mGauss.
-    applied_later_s
-        The firmware corrects a reading with a control quantity this much older than what
-        disturbed it, seconds.
-    """
-
-    truncated: bool
-    applied_later_s: float
-
-
-@dataclass(frozen=True)
-class LagPrior:
-    """What is known of a lag before a recording is looked at, seconds.
-
-    Attributes
-    ----------
-    mean, width
-        Expected value, and its standard error.
-    """
-
-    mean: float
-    width: float
-
-
-@dataclass(frozen=True)
-class LagPriors:
-    """Lags of the field behind the attitude and of the control quantity behind the field."""
-
-    field: LagPrior
-    regressor: LagPrior
-
-
-@dataclass(frozen=True)
-class ThrustCurve:
-    """How a firmware turns thrust demand into a motor's duty.
-
-    Attributes
-    ----------
-    expo
-        −1 … 1: thrust = (1 − expo) · c + expo · c².
-    spin_min, spin_max
-        Duty at c = 0 and c = 1.
-    """
-
-    expo: float
-    spin_min: float
-    spin_max: float
-
-    def thrust(self, duty: FloatArray) -> FloatArray:
-        """Thrust demand 0 … 1 of motors with a duty, any shape.
-
-        Examples
-        --------
-        >>> ThrustCurve(expo=0.0, spin_min=0.1, spin_max=0.9).thrust(np.array([0.1, 0.5, 0.9]))
-        array([0. , 0.5, 1. ])
-        """
-        curve = np.clip((duty - self.spin_min) / (self.spin_max - self.spin_min), 0.0, 1.0)
-        return np.asarray((1 - self.expo) * curve + self.expo * curve**2)
-
-
-@dataclass(frozen=True)
-class MotorOutputs:
-    """Which servo outputs drive motors, and what they mean.
-
-    Attributes
-    ----------
-    channels
-        Indices into the outputs.
-    low, high
-        Microseconds of duty 0 and 1.
-    curve
-        From thrust demand to duty; None where unknown.
-    numbers
-        The motor that each channel drives, as the firmware counts them, from 1.
-    """
-
-    channels: tuple[int, ...]
-    low: float
-    high: float
-    curve: ThrustCurve | None
-    numbers: tuple[int, ...] = ()
-
-
-@dataclass(frozen=True)
-class MotorLaw:
-    """How a firmware corrects motor by motor: Σ vector · (duty · volts) to the power of exponent.
-
-    Attributes
-    ----------
-    numbers
-        The motors it has vectors for.
-    most_exponent
-        The largest exponent that it takes.
-    """
-
-    numbers: tuple[int, ...]
-    most_exponent: float
 
 
 class Autopilot(Protocol):
@@ -247,6 +103,11 @@ class Autopilot(Protocol):
         ...
 
     @property
+    def motor_test(self) -> MotorTest:
+        """How motors are spun on the ground."""
+        ...
+
+    @property
     def device_ids_describe(self) -> str:
         """What a device id says, in words, where it does not tell one vehicle from its twin."""
         ...
@@ -263,6 +124,10 @@ class Autopilot(Protocol):
 
     def field_meaning(self, source_format: str) -> FieldMeaning:
         """What the readings of a source are, by ``Recording.format``."""
+        ...
+
+    def compass_messages(self, values: Mapping[str, float]) -> Mapping[int, str]:
+        """The telemetry message that is taken for each compass, by its number."""
         ...
 
     def from_telemetry(
@@ -464,7 +329,7 @@ class Autopilot(Protocol):
         ...
 
     def write_warnings(
-        self, asked: Mapping[str, float], values: Mapping[str, float]
+        self, asked: Mapping[str, float], held: Mapping[str, float]
     ) -> tuple[str, ...]:
         """What a pilot must know of a write, beyond :meth:`warnings`.
 
@@ -472,8 +337,8 @@ class Autopilot(Protocol):
         ----------
         asked
             What shall be written.
-        values
-            What the vehicle will hold afterwards.
+        held
+            What the vehicle holds before.
         """
         ...
 
@@ -493,6 +358,10 @@ class Autopilot(Protocol):
         source_format
             As in ``Recording.format``.
         """
+        ...
+
+    def link_notes(self, compasses: int) -> tuple[str, ...]:
+        """What a user must know of a live link with so many compasses; a clause each."""
         ...
 
     def reading_notes(self, recording: Recording) -> tuple[str, ...]:

@@ -10,15 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from magcomp.autopilots import px4_settings
-from magcomp.autopilots.protocol import (
-    FieldMeaning,
-    LagPrior,
-    LagPriors,
-    MotorLaw,
-    MotorOutputs,
-    ParameterName,
-    ThrustCurve,
-)
+from magcomp.autopilots.motor_test import Px4MotorTest
 from magcomp.autopilots.px4_correction import (
     MGAUSS,
     REGRESSOR_OF,
@@ -46,6 +38,15 @@ from magcomp.autopilots.px4_names import (
 from magcomp.autopilots.px4_rotation import sensor_to_body
 from magcomp.autopilots.px4_settings import NUMBERS
 from magcomp.autopilots.px4_telemetry import by_slot
+from magcomp.autopilots.terms import (
+    FieldMeaning,
+    LagPrior,
+    LagPriors,
+    MotorLaw,
+    MotorOutputs,
+    ParameterName,
+    ThrustCurve,
+)
 from magcomp.errors import InputError, MissingDataError
 from magcomp.model import (
     CURRENT,
@@ -84,6 +85,8 @@ _LOG_BITS = {
     "parameters": "give the whole log, which has them at its beginning",
     "position": "fly where satellites are seen",
 }
+_SEVERAL = 2
+_OTHER_COMPASSES = ("SCALED_IMU2", "SCALED_IMU3")
 _OWN_LOG = "give the vehicle's own log of the same flight (.ulg)"
 _LINK_MESSAGES = {
     "compass": f"{_OWN_LOG}, or ask for SCALED_IMU, SCALED_IMU2 and SCALED_IMU3 at 10 Hz",
@@ -113,6 +116,7 @@ class Px4:
     first_slot_leads = False
     first_compass_message = "SCALED_IMU"
     storage_s = 2.5  # it saves all at once, 0.3 s after a change and not again for 2 s
+    motor_test = Px4MotorTest()
     device_ids_describe = "bus, address and type of a sensor, which are alike in vehicles of a kind"
 
     def require_fittable(self, recording: Recording) -> None:
@@ -139,6 +143,11 @@ class Px4:
     def field_meaning(self, source_format: str) -> FieldMeaning:
         """On the link whole mGauss, in the log floats."""
         return FieldMeaning(truncated=source_format != "ulog", applied_later_s=0.0)
+
+    def compass_messages(self, values: Mapping[str, float]) -> Mapping[int, str]:
+        """In the order of the slots that are in use; which sensor has which, no message says."""
+        slots = [compass.slot for compass in px4_settings.compasses(values)]
+        return dict(zip(slots, (self.first_compass_message, *_OTHER_COMPASSES), strict=False))
 
     def from_telemetry(
         self, told: Mapping[int, Series], values: Mapping[str, float]
@@ -305,10 +314,10 @@ class Px4:
     def write_warnings(
         self,
         asked: Mapping[str, float],
-        values: Mapping[str, float],
+        held: Mapping[str, float],
     ) -> tuple[str, ...]:
         """Of vectors without their switch, and of a restart."""
-        return tuple(px4_settings.write_warnings(asked, values))
+        return tuple(px4_settings.write_warnings(asked, held))
 
     def multiplied(self, vehicle: Vehicle) -> tuple[str, ...]:  # noqa: ARG002
         """Thrust and current, whatever the vehicle."""
@@ -318,6 +327,15 @@ class Px4:
         """A bit of SDLOG_PROFILE; telemetry as it is sends too little of everything."""
         asked = _LOG_BITS if source_format == "ulog" else _LINK_MESSAGES
         return asked[quantity]
+
+    def link_notes(self, compasses: int) -> tuple[str, ...]:
+        """Of messages that do not say which compass is which."""
+        if compasses < _SEVERAL:
+            return ()
+        return (
+            "the link does not tell which compass is which: each is taken for the calibration slot "
+            f"that fits it best; {_OWN_LOG} to be sure",
+        )
 
     def reading_notes(self, recording: Recording) -> tuple[str, ...]:
         """Of telemetry that does not say which compass is which."""

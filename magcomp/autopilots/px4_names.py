@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 
-from magcomp.autopilots.protocol import Kind, ParameterName
+from magcomp.autopilots.terms import Kind, ParameterName
 
 SLOTS = range(4)
 AXES = ("X", "Y", "Z")

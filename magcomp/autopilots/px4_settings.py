@@ -10,7 +10,6 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from magcomp.autopilots.protocol import Kind
 from magcomp.autopilots.px4_correction import Compensation, stored
 from magcomp.autopilots.px4_names import (
     BOARD_ANGLES,
@@ -23,6 +22,8 @@ from magcomp.autopilots.px4_names import (
     single_name,
 )
 from magcomp.autopilots.px4_rotation import ROTATIONS, rotation_number
+from magcomp.autopilots.px4_taking_over import sentences
+from magcomp.autopilots.terms import Kind
 from magcomp.errors import InputError, MissingDataError, ParameterFileError
 from magcomp.model import Compass, ParameterHistory
 
@@ -123,15 +124,15 @@ def warnings(values: Mapping[str, float]) -> Iterator[str]:
             )
 
 
-def write_warnings(asked: Mapping[str, float], values: Mapping[str, float]) -> Iterator[str]:
+def write_warnings(asked: Mapping[str, float], held: Mapping[str, float]) -> Iterator[str]:
     """What a pilot must know of a write besides."""
+    values = {**held, **asked}
     kinds = {
         found.kind for name, value in asked.items() if value and (found := parse(name)) is not None
     }
     if Kind.MOTOR in kinds and values.get(COMPENSATION_SWITCH) == 0:
         yield f"{COMPENSATION_SWITCH} stays 0: the compensation will not be in force"
-    if kinds & {Kind.MOTOR, Kind.OFFSET, Kind.DIAGONAL, Kind.OFF_DIAGONAL}:
-        yield "restart the vehicle after writing: PX4 takes small changes over only when it starts"
+    yield from sentences(asked, held, tuple(each.slot for each in compasses(values)))
 
 
 def relevant_names() -> tuple[str, ...]:

@@ -14,8 +14,8 @@ from typing import NamedTuple, NoReturn
 
 import click
 
-from magcomp import __version__
 from magcomp.cli.output import complain, flush
+from magcomp.cli.version import show_version
 from magcomp.errors import ExitCode, MagcompError, NoLogError
 
 
@@ -37,6 +37,9 @@ COMMANDS = {
     "reproduce": _Command("magcomp.cli.reproduce", "Reproduce the paper's experiments."),
     "calibrate": _Command(
         "magcomp.cli.calibrate", "Guide, record and fit a live vehicle; write the answer to it."
+    ),
+    "sweep": _Command(
+        "magcomp.cli.sweep", "Spin the motors on the ground, step by step; fit and write."
     ),
     "record": _Command("magcomp.cli.record", "Record a live vehicle into a .tlog."),
     "upload": _Command("magcomp.cli.upload", "Write a parameter file to a vehicle, and prove it."),
@@ -90,7 +93,14 @@ class LazyGroup(click.Group):
     epilog="Exit codes: 0 good, 1 fit rejected, 2 usage or unreadable input, 3 link, 4 timeout, "
     "5 write or read-back mismatch, 130 interrupted.",
 )
-@click.version_option(__version__, prog_name="magcomp")
+@click.option(
+    "--version",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=show_version,
+    help="Show the version and the commit, and exit.",
+)
 @click.option("--debug", is_flag=True, help="Show the traceback of an unexpected error.")
 def app(debug: bool) -> None:
     """Find how a multirotor's motors shift its compass, and what cancels the shift.

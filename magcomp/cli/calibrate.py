@@ -2,123 +2,38 @@
 
 from __future__ import annotations
 
-import functools
 import math
 import threading
-import time
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
 
 import click
 
-from magcomp.analysis import Options, parameter_set
+from magcomp.analysis import Options
 from magcomp.cli.linking import (
     LinkOptions,
     StatusLine,
     address_argument,
-    any_vehicle_option,
     link_options,
     positive_seconds,
-    replayed,
     stop_on_interrupt,
-    yes_option,
 )
-from magcomp.cli.options import check_output, json_option, method_option, regressor_option
-from magcomp.cli.output import answer, complain, look, progress
-from magcomp.cli.writing import agreed, carry_out, need_consent, show_difference
-from magcomp.errors import ExitCode, InputError, UsageError
+from magcomp.cli.options import method_option, regressor_option
+from magcomp.cli.wishes import Wishes, finish, record_option, recording_file, wish_options
+from magcomp.errors import ExitCode, UsageError
 from magcomp.link import Replay, parse_address
 from magcomp.live.guide import pilot_is_done
 from magcomp.live.session import LiveSession
 from magcomp.live.situation import Manoeuvre
 from magcomp.live.snapshot import LiveSnapshot
-from magcomp.live.upload import DISARM_S, new_file
-from magcomp.model import Analysis, Grade, ParameterSet, Recording
-from magcomp.report import as_json
-from magcomp.writing.files import SUFFIXES, write_parameter_file
-from magcomp.writing.writer import restore_command
-
-_Result = TypeVar("_Result")
 
 _LOOK_S = 0.25
 _LEAST_CHANGE_S = 2.0
 
 
-@dataclass(frozen=True)
-class Wishes:
-    """What is to become of the answer.
-
-    Attributes
-    ----------
-    output
-        The parameter file, or None.
-    upload, yes, any_vehicle, to_json, force
-        The options of these names.
-    wait
-        Seconds a pilot has to disarm before the write.
-    """
-
-    output: Path | None
-    upload: bool
-    yes: bool
-    any_vehicle: bool
-    to_json: bool
-    force: bool
-    wait: float
-
-
-def wish_options(command: Callable[..., _Result]) -> Callable[..., _Result]:
-    """Give a command the options of `Wishes` as one."""
-
-    @click.option(
-        "-o",
-        "--output",
-        type=click.Path(path_type=Path),
-        metavar="FILE",
-        help=f"Write the parameters; the suffix chooses the form: {', '.join(SUFFIXES)}.",
-    )
-    @click.option("--upload", is_flag=True, help="Write them to the vehicle, once it is disarmed.")
-    @yes_option
-    @any_vehicle_option
-    @click.option(
-        "--wait",
-        type=click.FloatRange(min=0.0),
-        default=DISARM_S,
-        show_default=True,
-        metavar="S",
-        help="How long to wait for the vehicle to be disarmed before it is written.",
-    )
-    @json_option
-    @click.option("--force", is_flag=True, help="Overwrite files.")
-    @functools.wraps(command)
-    def with_wishes(
-        output: Path | None,
-        upload: bool,
-        yes: bool,
-        any_vehicle: bool,
-        wait: float,
-        to_json: bool,
-        force: bool,
-        **others: object,
-    ) -> _Result:
-        wishes = Wishes(output, upload, yes, any_vehicle, to_json, force, wait)
-        return command(wishes=wishes, **others)
-
-    return with_wishes
-
-
 @click.command("calibrate")
 @address_argument
 @click.option("--seconds", type=float, metavar="S", help="End after so long at the latest.")
-@click.option(
-    "--record",
-    "record_to",
-    type=click.Path(path_type=Path),
-    metavar="FILE.tlog",
-    help="Where all that arrives is kept; by default in magcomp's data directory.",
-)
+@record_option
 @click.option(
     "--manoeuvre",
     type=click.Choice([each.value for each in Manoeuvre]),
@@ -146,14 +61,9 @@ def calibrate(
     """
     options = Options(method=method, regressor=regressor)
     limit = positive_seconds(seconds) or math.inf
-    if wishes.upload:
-        need_consent(yes=wishes.yes)
-        if isinstance(parse_address(address, baud=link.baud), Replay):
-            raise UsageError(f"--upload must be given with a vehicle; instead received {address}")
-    record_to = record_to or new_file("recording", ".tlog", None, time.time())
-    check_output(record_to, (".tlog",), replayed(address), force=wishes.force)
-    if wishes.output is not None:
-        check_output(wishes.output, SUFFIXES, record_to, force=wishes.force)
+    if wishes.upload and isinstance(parse_address(address, baud=link.baud), Replay):
+        raise UsageError(f"--upload must be given with a vehicle; instead received {address}")
+    record_to = recording_file(record_to, address, wishes)
     with LiveSession.open(
         address,
         record=record_to,
@@ -167,13 +77,7 @@ def calibrate(
     ) as session:
         session.manoeuvre = None if manoeuvre is None else Manoeuvre(manoeuvre)
         _collect(session, link.timeout, limit)
-        recording, analysis = _fit(session, options, record_to)
-        chosen = parameter_set(analysis)
-        _show(recording, analysis, chosen, wishes)
-        if analysis.grade is Grade.REJECTED:
-            complain("Nothing is written because no compass has a fit to be trusted")
-            return ExitCode.REJECTED
-        return _upload(session, chosen, wishes) if wishes.upload else ExitCode.GOOD
+        return finish(session, options, record_to, wishes)
 
 
 def _collect(session: LiveSession, timeout: float, limit: float) -> None:
@@ -263,61 +167,3 @@ def _line(shown: LiveSnapshot) -> str:
         parts.append(f"loss {100 * shown.link.loss:.0f} %")
     parts.append(str(shown.grade) if shown.grade else "no fit yet")
     return " | ".join(parts)
-
-
-def _fit(session: LiveSession, options: Options, record_to: Path) -> tuple[Recording, Analysis]:
-    """Fit what was recorded; where that fails, say where the recording is."""
-    try:
-        with progress() as step:
-            recording = session.recording()
-            analysis = session.analyse(options, lambda what, share: step(f"fitting {what}", share))
-    except InputError:
-        complain(f"The recording is kept: {record_to}")
-        raise
-    complain(f"Recording: {record_to}")
-    return recording, analysis
-
-
-def _show(recording: Recording, analysis: Analysis, chosen: ParameterSet, wishes: Wishes) -> None:
-    written = None
-    if wishes.output is not None and analysis.grade is not Grade.REJECTED:
-        write_parameter_file(wishes.output, chosen, force=wishes.force)
-        written = str(wishes.output)
-    if wishes.to_json:
-        answer(as_json.dumps(as_json.analysis_object(analysis, written)))
-        return
-    # Rich is only worth its import where an answer is for people.
-    from magcomp.report import as_text  # noqa: PLC0415
-
-    # Before an upload the difference to the vehicle itself is shown.
-    shown = {} if wishes.upload else chosen.values
-    present = recording.parameters.latest
-    answer(as_text.analysis_text(analysis, shown, present, look(), advise=False))
-    if written is not None:
-        complain(f"Written to {written}")
-
-
-def _upload(session: LiveSession, chosen: ParameterSet, wishes: Wishes) -> ExitCode:
-    """Show the difference, ask, wait for the motors to stand still, write."""
-    plan = session.upload_plan(chosen, wishes.any_vehicle)
-    show_difference(plan, to_stderr=wishes.to_json)
-    if not plan.changes:
-        complain("The vehicle holds all of this already; nothing is written")
-        return ExitCode.GOOD
-    session.wait_disarmed(wishes.wait, tell=complain)
-    if not agreed(len(plan.changes), yes=wishes.yes):
-        complain("Nothing is written")
-        return ExitCode.INTERRUPTED
-    address = str(session.connection.address)
-    backup = new_file("backup", ".param", plan.vehicle, time.time())
-    with stop_on_interrupt() as stop:
-        code = carry_out(
-            plan,
-            lambda tell, stopped: session.upload(plan, backup, tell, stopped),
-            backup,
-            address,
-            stop,
-        )
-    if code is ExitCode.GOOD:
-        complain(f"To undo this:\n  {restore_command(backup, address)}")
-    return code

@@ -25,6 +25,7 @@ from magcomp.errors import ExitCode, MissingDataError, ParameterFileError, Usage
 from magcomp.experiments.motion import HeadingAccuracy, accuracy, heading_errors
 from magcomp.geometry import wrap_angle
 from magcomp.model import FloatArray, Grade, InForce, Recording, Series
+from magcomp.report.as_json import SCHEMA
 from magcomp.report.words import printable
 from magcomp.sources.truth import Truth, read_truth
 
@@ -189,6 +190,7 @@ def _document(found: _Answer) -> dict[str, Any]:
     made = found.track
     return {
         "magcomp": __version__,
+        "schema": SCHEMA,
         "source": found.recording.source,
         "compass": made.compass,
         "correction": {"from": found.origin, "regressor": found.regressor},

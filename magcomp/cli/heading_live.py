@@ -9,9 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from threading import Event
 
+from magcomp import autopilots
 from magcomp.align import expected_earth, has_position
 from magcomp.cli.linking import LinkOptions, StatusLine, stop_on_interrupt
-from magcomp.cli.output import answer
+from magcomp.cli.output import answer, complain
 from magcomp.errors import AddressError, ExitCode
 from magcomp.link import Replay, parse_address
 from magcomp.live.heading import LiveHeading, Sensors, corrections, live_headings
@@ -63,7 +64,6 @@ def follow(address: str, link: LinkOptions, wanted: Following) -> ExitCode:
     InputError
         The correction cannot be told from the one in force.
     """
-    sensors = Sensors(wanted.compass)
     with (
         stop_on_interrupt() as stop,
         LiveSession.open(
@@ -79,6 +79,7 @@ def follow(address: str, link: LinkOptions, wanted: Following) -> ExitCode:
         vehicle = session.wait_ready(link.timeout)
         recording = _placed(session, stop)
         shown, present = corrections(recording, wanted.chosen, wanted.compass)
+        sensors = Sensors(wanted.compass, vehicle, recording.parameters.latest)
         declination = expected_earth(recording).declination if has_position(recording) else 0.0
         session.listen(sensors)
         status, begun = StatusLine(terminal=False), session.elapsed_s
@@ -87,10 +88,12 @@ def follow(address: str, link: LinkOptions, wanted: Following) -> ExitCode:
             late = session.elapsed_s - begun >= wanted.seconds
             return stop.is_set() or late or session.connection.ended
 
+        for note in autopilots.of(vehicle).link_notes(len(vehicle.compasses)):
+            complain(f"{note[:1].upper()}{note[1:]}")
         if not wanted.to_json:
             answer(f"{'time, s':>10}{'raw':>13}{'corrected':>13}{'fused':>13}\n")
         second = None
-        for heading in live_headings(sensors, vehicle, shown, present, declination, over):
+        for heading in live_headings(sensors, shown, present, declination, over):
             if math.floor(heading.time) != second:
                 second = math.floor(heading.time)
                 status.show(session.snapshot().link_text)

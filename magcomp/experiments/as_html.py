@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from magcomp import __version__
 from magcomp.experiments.as_text import FLIGHT, KINDS, TURN
@@ -12,8 +13,8 @@ from magcomp.experiments.figures import figures
 from magcomp.experiments.paper import FLIGHT_COMPENSATED_DEG, FLIGHT_UNCOMPENSATED_DEG
 from magcomp.experiments.reproduce import Experiments, Reproduction
 from magcomp.report.figure import Figure
-from magcomp.report.html_page import canvas, page
-from magcomp.report.html_parts import DASH, Numbers, table, text
+from magcomp.report.html_page import page
+from magcomp.report.html_parts import DASH, Numbers, templates
 
 _TITLE = "Three-axis compass correction under varying control quantity, reproduced"
 _COLUMNS = (
@@ -48,47 +49,55 @@ def html(made: Reproduction) -> str:
     numbers = Numbers(json.loads(source))
     kinds = {"simulated": made.simulated, "recorded": made.recorded}
     done = {name: each for name, each in kinds.items() if each is not None}
-    drawn = {name: figures(each.turntable, each.flights) for name, each in done.items()}
+    drawn = {
+        name: {f"{figure.name}-{name}": figure for figure in figures(each.turntable, each.flights)}
+        for name, each in done.items()
+    }
     body = (
-        f'<header style="margin-top:2rem"><p class="overline">magcomp {__version__} reproduce</p>'
-        f"<h1><span>{text(_TITLE)}</span></h1></header><main>"
-        f"{_summary(numbers, done)}"
-        f"<section><h2>Table 1</h2><p>{text(TURN)}</p>{_table(numbers, done)}{_methods()}"
-        "</section>"
-        f"<section><h2>The flights</h2><p>{text(FLIGHT)}</p>{_flights(numbers, done)}</section>"
-        + "".join(_pictures(name, done[name], drawn[name]) for name in done)
-        + "</main>"
+        templates("magcomp.experiments")
+        .get_template("reproduction.html.j2")
+        .render(
+            title=_TITLE,
+            version=__version__,
+            kinds=[_kind(numbers, name, each, drawn[name]) for name, each in done.items()],
+            turn=TURN,
+            errors=_errors(numbers, done),
+            methods=_METHODS,
+            flight=FLIGHT,
+            flights=_flights(numbers, done),
+        )
     )
-    pictures = {f"{f.name}-{name}": f for name, figs in drawn.items() for f in figs}
+    pictures = {name: figure for each in drawn.values() for name, figure in each.items()}
     return page(f"magcomp: {_TITLE}", body, source, pictures)
 
 
-def _summary(numbers: Numbers, done: Mapping[str, Experiments]) -> str:
-    """What the paper claims, and whether it appears."""
-    items = "".join(
-        f"<li><b>{text(_capital(KINDS[name]))}.</b> At rest the ellipsoid alone leaves "
-        f"{numbers.show(name, 0, 'ellipsoid_deg', decimals=2)}°, at "
-        f"{numbers.show(name, 2, 'current_a', decimals=0)} A "
-        f"{numbers.show(name, 2, 'ellipsoid_deg', decimals=1)}°; magcomp leaves "
-        f"{numbers.show(name, 0, 'magcomp_deg', decimals=2)}° and "
-        f"{numbers.show(name, 2, 'magcomp_deg', decimals=2)}°.</li>"
-        for name in done
-    )
-    return (
-        "<p>The paper’s claim: a correction made with the motors off grows wrong with the control "
-        "quantity, one that follows the ellipsoid’s centre along its line does not.</p>"
-        f'<ul class="reasons">{items}</ul>'
-    )
+def _kind(
+    numbers: Numbers, name: str, made: Experiments, drawn: Mapping[str, Figure]
+) -> dict[str, Any]:
+    """One kind of vehicle: whether what the paper claims appears, and the figures."""
+    show = numbers.show
+    return {
+        "name": KINDS[name],
+        "title": _capital(KINDS[name]),
+        "ellipsoid_at_rest": show(name, 0, "ellipsoid_deg", decimals=2),
+        "current": show(name, 2, "current_a", decimals=0),
+        "ellipsoid": show(name, 2, "ellipsoid_deg", decimals=1),
+        "magcomp_at_rest": show(name, 0, "magcomp_deg", decimals=2),
+        "magcomp": show(name, 2, "magcomp_deg", decimals=2),
+        "source": f"{Path(made.turntable.source).name}, compass {made.turntable.compass}",
+        "lag_ms": f"{1000 * made.turntable.lag_s:.0f}",
+        "figures": list(drawn.items()),
+    }
 
 
 def _capital(words: str) -> str:
     return words[0].upper() + words[1:]
 
 
-def _table(numbers: Numbers, done: Mapping[str, Experiments]) -> str:
+def _errors(numbers: Numbers, done: Mapping[str, Experiments]) -> dict[str, Any]:
     """A row for each control quantity of the paper and of each kind of vehicle."""
     names = {"paper": "The paper", **{name: _capital(KINDS[name]) for name in done}}
-    head = ["", "control, ‰", "current, A", *(name for name, _, _ in _COLUMNS)]
+    head = ["whose", "control, ‰", "current, A", *(name for name, _, _ in _COLUMNS)]
     rows = []
     for kind, name in names.items():
         for index in range(len(numbers.at(kind))):
@@ -97,7 +106,7 @@ def _table(numbers: Numbers, done: Mapping[str, Experiments]) -> str:
             decimals = 1 if kind == "paper" else 2
             rows.append(
                 [
-                    text(name) if index == 0 else "",
+                    name,
                     numbers.show(kind, index, "control", decimals=0),
                     numbers.show(kind, index, "current_a", decimals=0),
                     *(
@@ -106,22 +115,12 @@ def _table(numbers: Numbers, done: Mapping[str, Experiments]) -> str:
                     ),
                 ]
             )
-    return table(head, rows, "Residual heading error, °", "numbers")
+    return {"head": head, "rows": rows}
 
 
-def _methods() -> str:
-    items = "".join(f"<li><b>{text(name)}</b>: {text(what)}</li>" for name, what in _METHODS)
-    return (
-        "<details><summary>What the lines are, and how they were measured</summary>"
-        f"<ul>{items}</ul><p>The corrections come from the turns about three axes; the level turn "
-        "they are measured on is kept from them. The field is compared with the true yaw of the "
-        "moment it was measured: how late it is reported is found by the truth, once for a "
-        "recording and without any of the corrections.</p></details>"
-    )
-
-
-def _flights(numbers: Numbers, done: Mapping[str, Experiments]) -> str:
-    head = ["heading error, °", "not compensated", "compensated", "fused by magcomp", "apart, m"]
+def _flights(numbers: Numbers, done: Mapping[str, Experiments]) -> dict[str, Any]:
+    courses = ("not compensated", "compensated", "fused by magcomp")
+    head = ["whose", *(f"{course}, °" for course in courses), "apart, m"]
     paper = [f"{FLIGHT_UNCOMPENSATED_DEG:.0f}", f"{FLIGHT_COMPENSATED_DEG:.0f}", DASH, DASH]
     rows = [["the paper", *paper]]
     for name in done:
@@ -133,16 +132,5 @@ def _flights(numbers: Numbers, done: Mapping[str, Experiments]) -> str:
             for course in ("uncompensated", "compensated", "fused")
         ]
         apart = numbers.show("flights", name, "paths_apart_m", decimals=1)
-        rows.append([text(KINDS[name]), *cells, apart])
-    return table(head, rows, "Largest (root mean square) error while airborne", "numbers")
-
-
-def _pictures(name: str, made: Experiments, drawn: Sequence[Figure]) -> str:
-    source = text(f"{Path(made.turntable.source).name}, compass {made.turntable.compass}")
-    shown = "".join(canvas(f"{figure.name}-{name}", figure) for figure in drawn)
-    return (
-        f"<section><h2>Figures: {text(KINDS[name])}</h2>"
-        f'<p class="note">Turntable: {source}; the field is reported '
-        f"{1000 * made.turntable.lag_s:.0f} ms after it was measured.</p>"
-        f'<div class="figures">{shown}</div></section>'
-    )
+        rows.append([KINDS[name], *cells, apart])
+    return {"head": head, "rows": rows}

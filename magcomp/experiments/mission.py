@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from magcomp.analysis import Options, analyse
 from magcomp.compensate import track
 from magcomp.errors import MissingDataError
 from magcomp.experiments.motion import heading_errors
+from magcomp.geometry import apart
 from magcomp.model import FloatArray, Recording
 from magcomp.sources.truth import Truth
 
@@ -100,8 +100,7 @@ def flights(
         Where a recording is not of a flight.
     """
     first, second = flight(*uncompensated), flight(*compensated)
-    nearest, _ = cKDTree(second.path).query(first.path)
-    return Flights(first, second, _fused(*uncompensated), float(np.max(nearest)))
+    return Flights(first, second, _fused(*uncompensated), apart(first.path, second.path))
 
 
 def flight(recording: Recording, truth: Truth) -> Flight:

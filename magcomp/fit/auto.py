@@ -31,7 +31,7 @@ from magcomp.fit.flight import (
 )
 from magcomp.fit.folds import folds
 from magcomp.fit.levels import centres_of_flight, fit_levels, usable_levels, with_line
-from magcomp.fit.motors import alike_where_unseen, differences_of
+from magcomp.fit.motors import alike_where_unseen, blur, differences_of
 from magcomp.fit.residual import residuals, spread
 from magcomp.fit.robust import Estimate
 from magcomp.fit.sweep import fit_sweep, is_still
@@ -164,7 +164,7 @@ def fit_flight(problem: Problem) -> MotorFit:
     tell = differences_of(len(found.parameters))
     told_apart = tell @ found.covariance @ tell.T
     if len(told_apart):
-        found = alike_where_unseen(found)
+        found = alike_where_unseen(found, blur(problem.control.series.value))
     lags = lags_of(found.parameters)
     samples = problem.sample(lags)
     std = np.sqrt(np.diag(found.covariance))

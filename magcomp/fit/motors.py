@@ -22,6 +22,11 @@ _WIDTHS = np.concatenate([[0.0], np.geomspace(0.01, 100.0, 41)])
 _SMALL = 1e-6
 """Of the differences' own variance: keeps the matrix from being singular at no width."""
 
+_WHITE = 1.5
+"""Mean square by which the mean of its neighbours misses a row of noise, of the noise's own."""
+
+_LEAST_ROWS = 3
+
 Found = TypeVar("Found", bound=Estimate)
 
 
@@ -50,13 +55,42 @@ def differences_of(size: int) -> FloatArray:
     return made
 
 
-def alike_where_unseen(found: Found) -> Found:
+def blur(parts: FloatArray) -> float:
+    """Share of the differences between motors that is lost between two rows, 0 … 1.
+
+    Parameters
+    ----------
+    parts
+        What each motor draws, at the times it is told, shape (n, k).
+
+    Notes
+    -----
+    By how well a row is told by its neighbours: not at all where the outputs are told more seldom
+    than the motors change. Then the differences come out too small by an unknown share.
+
+    Examples
+    --------
+    >>> slow, fast = np.sin(np.arange(100.0) / 20), np.array([1.0, -1.0] * 50)
+    >>> blur(np.column_stack([slow, -slow])) < 1e-4, blur(np.column_stack([fast, -fast]))
+    (True, 1.0)
+    """
+    if len(parts) < _LEAST_ROWS:
+        return 1.0
+    apart = parts - parts.mean(axis=1, keepdims=True)
+    told = apart[1:-1] - (apart[:-2] + apart[2:]) / 2.0
+    whole = float(np.mean((apart - apart.mean(axis=0)) ** 2))
+    return min(1.0, (float(np.mean(told**2)) / (_WHITE * whole)) ** 2) if whole > 0.0 else 1.0
+
+
+def alike_where_unseen(found: Found, lost: float = 0.0) -> Found:
     """The estimate with a prior that motors disturb alike, as wide as makes it likeliest.
 
     Parameters
     ----------
     found
         Made without such a prior; its parameters end with the other motors' vectors.
+    lost
+        From :func:`blur`: the covariance is wider by this share of the differences.
 
     Notes
     -----
@@ -80,5 +114,7 @@ def alike_where_unseen(found: Found) -> Found:
     return replace(
         found,
         parameters=found.parameters - gain @ apart,
-        covariance=found.covariance - gain @ tell @ found.covariance,
+        covariance=found.covariance
+        - gain @ tell @ found.covariance
+        + lost**2 * float(np.mean(apart**2)) * tell.T @ tell,
     )

@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
+from magcomp.align import interpolate
+from magcomp.fit.nearest import moved, nearest
 from magcomp.geometry import body_from_earth, heading_shift, level_matrix, wrap_angle
 from magcomp.model import (
     CORRECTION_SIZE,
     OFFSET,
     SOFT_IRON,
+    Control,
     Correction,
     FloatArray,
     HeadingError,
+    InForce,
     MotorFit,
+    Samples,
     quantity_of,
     symmetric,
 )
@@ -34,6 +41,55 @@ def attitudes() -> tuple[FloatArray, FloatArray, FloatArray]:
 def control_grid(fit: MotorFit) -> FloatArray:
     """Control quantities a table of heading errors is given at."""
     return quantity_of(fit.regressor).rows(fit.u_high)
+
+
+def multiplied_in_force(
+    u: FloatArray,
+    kind: str | None,
+    fit: MotorFit,
+    controls: Mapping[str, Control],
+    samples: Samples,
+) -> FloatArray:
+    """What the motor correction in force multiplies at each control quantity, shape (k,).
+
+    Parameters
+    ----------
+    u
+        Of the fit, shape (k,).
+    kind
+        The control quantity that the correction in force multiplies; None where it is off.
+    fit, samples
+        The fit, and the readings at its lags.
+    controls
+        The control quantities as the autopilot reported them.
+
+    Notes
+    -----
+    Another quantity than the fit's own is taken as a straight line of it, as the recording shows.
+    """
+    if kind in (None, fit.regressor) or kind not in controls or controls[kind].parts > 1:
+        return u
+    other = interpolate(controls[kind].series, samples.time - samples.lags.regressor)
+    slope, intercept = np.polyfit(samples.total, other, 1)
+    return np.asarray(np.maximum(intercept + slope * u, 0.0))
+
+
+def present_by(present: InForce, controls: Mapping[str, Control], samples: Samples) -> Correction:
+    """The correction in force; one motor by motor as the nearest by the fit's own quantity.
+
+    Parameters
+    ----------
+    present
+        What is in force.
+    controls, samples
+        As for :func:`multiplied_in_force`.
+    """
+    known = controls.get(present.regressor or "")
+    if known is None or known.parts == 1:
+        return present.correction
+    then = samples.time - samples.lags.regressor
+    added = present.correction.added(present.multiplied(interpolate(known.series, then)))
+    return moved(present.correction, nearest(added, samples.total[:, None])[0])
 
 
 def heading_errors(
@@ -66,9 +122,7 @@ def heading_errors(
     Equation 7, on draws of all 12 parameters.
     """
     roll, pitch, yaw = attitudes()
-    horizontal = np.sqrt(max(fit.strength**2 - fit.vertical**2, 1.0))
-    earth = np.array([horizontal, 0.0, fit.vertical])
-    field = body_from_earth(roll, pitch, yaw) @ earth
+    field = _field_at(fit, roll, pitch, yaw)
     draws = rng.multivariate_normal(
         np.zeros(CORRECTION_SIZE), fit.shared_covariance, size=_DRAWS, method="eigh"
     )
@@ -89,6 +143,36 @@ def heading_errors(
             )
         )
     return tuple(rows)
+
+
+def level_errors(fit: MotorFit, present: Correction, u: float, present_u: float) -> FloatArray:
+    """Heading error of the correction in force over a level turn, at one control quantity.
+
+    Parameters
+    ----------
+    fit
+        Its correction is taken as the truth.
+    present
+        The correction in force.
+    u, present_u
+        The control quantity, and what ``present.motor`` is multiplied by there.
+
+    Returns
+    -------
+    ndarray, shape (36,)
+        Heading found less true heading, radians, at true headings 0°, 10° … 350°.
+    """
+    roll = np.zeros_like(_YAWS)
+    field = _field_at(fit, roll, roll, _YAWS)
+    raw = fit.correction.undo(field, np.full(len(field), u))
+    return shifts(present.apply(raw, np.full(len(raw), present_u)), field, roll, roll)
+
+
+def _field_at(fit: MotorFit, roll: FloatArray, pitch: FloatArray, yaw: FloatArray) -> FloatArray:
+    """The earth's field as found, in body axes at each attitude, mGauss, shape (k, 3)."""
+    horizontal = np.sqrt(max(fit.strength**2 - fit.vertical**2, 1.0))
+    earth = np.array([horizontal, 0.0, fit.vertical])
+    return np.asarray(body_from_earth(roll, pitch, yaw) @ earth)
 
 
 def largest_shift(

@@ -8,13 +8,16 @@ from functools import partial
 
 import numpy as np
 
-from magcomp.align import interpolate
 from magcomp.fit import Problem
-from magcomp.fit.nearest import moved, nearest
 from magcomp.judge.evidence import cover, field_residual, used_lags
 from magcomp.judge.finding import Finding, severity
 from magcomp.judge.gates import on_control, on_turn, on_unseen_parameters
-from magcomp.judge.heading_error import control_grid, heading_errors
+from magcomp.judge.heading_error import (
+    control_grid,
+    heading_errors,
+    multiplied_in_force,
+    present_by,
+)
 from magcomp.judge.keep import is_close, keep
 from magcomp.judge.motors import on_motors
 from magcomp.judge.thresholds import Thresholds
@@ -23,14 +26,12 @@ from magcomp.model import (
     CORRECTION_SIZE,
     MOTOR,
     OFFSET,
-    Correction,
     Coverage,
     FieldResidual,
     FloatArray,
     Grade,
     HeadingError,
     MotorFit,
-    Samples,
     Verdict,
     quantity_of,
 )
@@ -86,8 +87,12 @@ def judge(
     residual, motors = field_residual(problem, fit)
     fit = _widened(fit, motors)
     in_force = problem.readings.in_force[-1]
-    present = _present_by(problem, samples)
-    table = partial(heading_errors, fit, present, _present_control(problem, samples, fit))
+    table = partial(
+        heading_errors,
+        fit,
+        present_by(in_force, problem.in_force, samples),
+        multiplied_in_force(control_grid(fit), in_force.regressor, fit, problem.in_force, samples),
+    )
     errors = table(rng)
     alike = in_force.regressor in (None, fit.regressor) and problem.control.parts == 1
     stays = alike and is_close(fit, in_force.correction, errors)
@@ -140,30 +145,6 @@ def _floor(fit: MotorFit) -> FloatArray:
     floor[MOTOR] = floor[CORRECTION_SIZE:] = motor
     floor[OFFSET] = np.hypot(FLOOR_OFFSET_MGAUSS, motor * fit.u_high / 2.0 if bent else 0.0)
     return floor
-
-
-def _present_control(problem: Problem, samples: Samples, fit: MotorFit) -> FloatArray:
-    """What the motor correction in force multiplies at each control quantity of the table."""
-    grid = control_grid(fit)
-    kind = problem.readings.in_force[-1].regressor
-    if kind in (None, fit.regressor) or kind not in problem.in_force:
-        return grid
-    if problem.in_force[kind].parts > 1:
-        return grid
-    other = interpolate(problem.in_force[kind].series, samples.time - samples.lags.regressor)
-    slope, intercept = np.polyfit(samples.total, other, 1)
-    return np.asarray(np.maximum(intercept + slope * grid, 0.0))
-
-
-def _present_by(problem: Problem, samples: Samples) -> Correction:
-    """The correction in force; one motor by motor as the nearest by the fit's own quantity."""
-    present = problem.readings.in_force[-1]
-    known = problem.in_force.get(present.regressor or "")
-    if known is None or known.parts == 1:
-        return present.correction
-    then = samples.time - samples.lags.regressor
-    added = present.correction.added(present.multiplied(interpolate(known.series, then)))
-    return moved(present.correction, nearest(added, samples.total[:, None])[0])
 
 
 def _findings(

@@ -12,7 +12,7 @@ from magcomp.link.address import (
     parse_address,
     serial_ports,
 )
-from magcomp.link.connection import Connection, connect
+from magcomp.link.connection import Connection
 from magcomp.link.events import (
     GapEnded,
     GapStarted,
@@ -23,6 +23,7 @@ from magcomp.link.events import (
     VehicleRebooted,
 )
 from magcomp.link.framing import GROUND_STATION_SYSTEM
+from magcomp.link.opening import connect
 from magcomp.link.quality import Gap, LinkStatistics
 from magcomp.link.recorder import Recorder
 from magcomp.link.signing import is_read_by_others, read_signing_key

@@ -14,13 +14,10 @@ from magcomp.link.address import (
     SerialLine,
     TcpClient,
     TcpServer,
-    parse_address,
 )
-from magcomp.link.clock import Clock, SystemClock
 from magcomp.link.diagnosis import why_ambiguous, why_no_vehicle
 from magcomp.link.events import LinkEvent
 from magcomp.link.framing import GROUND_STATION_SYSTEM, Message
-from magcomp.link.opening import open_transport
 from magcomp.link.quality import LinkStatistics
 from magcomp.link.sinks import FrameSink, Sinks
 from magcomp.link.state import LinkState
@@ -382,56 +379,3 @@ class Connection:
     def _raise_failure(self) -> None:
         if self._failure is not None:
             raise LinkError(f"The link to {self.address} failed.") from self._failure
-
-
-def connect(
-    address: str | Address,
-    *,
-    baud: int | None = None,
-    system: int | None = None,
-    component: int | None = None,
-    key: bytes | None = None,
-    source_system: int = GROUND_STATION_SYSTEM,
-    sinks: Sequence[FrameSink] = (),
-    clock: Clock | None = None,
-) -> Connection:
-    """Open an address and start to listen.
-
-    Parameters
-    ----------
-    address
-        A connection string as in ``magcomp.link.address``, or what it was parsed into.
-    baud
-        For a serial port whose address does not say.
-    system, component
-        The vehicle to speak to; None takes the only system there is, and the component that
-        autopilots have.
-    key
-        Signing key of 32 bytes, from ``read_signing_key``.
-    source_system
-        The number this ground station gives itself.
-    sinks
-        Recorders and buffers; the caller closes them.
-    clock
-        The computer's clocks unless given.
-
-    Raises
-    ------
-    AddressError
-        ``address`` is not a connection string.
-    LinkError
-        It cannot be opened.
-    LogError
-        It is a log to replay, and is none.
-    """
-    where = parse_address(address, baud=baud) if isinstance(address, str) else address
-    time = clock or SystemClock()
-    return Connection(
-        where,
-        lambda: open_transport(where, time),
-        system=system,
-        component=component,
-        key=key,
-        source_system=source_system,
-        sinks=sinks,
-    )

@@ -42,11 +42,11 @@ from magcomp.link.identity import Identification, read_heartbeat
 from magcomp.link.quality import Gap, LinkStatistics, RateMeter, SequenceCounter
 from magcomp.link.streams import StreamControl, StreamReport
 from magcomp.link.transport import Peer
+from magcomp.link.vehicle_clock import VehicleClock
 from magcomp.mavlink.heartbeat import Identity, is_vehicle
 from magcomp.model import Vehicle
 
 HEARTBEAT_S = 1.0
-TIMESYNC_S = 2.0
 SILENCE_S = 3.0
 SETTLING_S = 1.5
 """Other vehicles send heartbeats each second: by then they would have been heard."""
@@ -55,9 +55,6 @@ MOVED_S = 6.0
 """Longer than a writer trusts a vehicle that sends no heartbeat (magcomp.writing.exchange)."""
 
 FORGOTTEN_S = 4.0
-_CLOCK_BACK_MS = 2000
-_CLOCK_BACK_TIMES = 3
-_OUTSTANDING = 16
 _FOREIGN_NAMES = 50
 _GAPS = 1000
 
@@ -117,12 +114,8 @@ class LinkState:
         self._meter = RateMeter()
         self._last_heard = -math.inf
         self._gaps: deque[Gap] = deque(maxlen=_GAPS)
-        self._round_trip_s = math.nan
-        self._asked_at: dict[int, float] = {}
-        self._boot_ms = -math.inf
-        self._boot_suspects = 0
+        self._clock = VehicleClock()
         self._next_heartbeat = -math.inf
-        self._next_timesync = -math.inf
         self._events: list[LinkEvent] = []
 
     # ---------------------------------------------------------------- what is known
@@ -194,7 +187,7 @@ class LinkState:
             signed=counts.signed,
             lost=self._sequence.lost,
             loss=self._meter.loss(now),
-            round_trip_s=self._round_trip_s,
+            round_trip_s=self._clock.round_trip_s,
             rates=self._meter.rates(now),
             gaps=tuple(self._gaps),
             reopened=reopened,
@@ -274,14 +267,7 @@ class LinkState:
                 self._streaming_at = now
                 self._ask_again()
             out += self._streams.due(now)
-        if now >= self._next_timesync:
-            self._next_timesync = now + TIMESYNC_S
-            stamp = max(1, round(now * 1e9))
-            self._asked_at[stamp] = now
-            while len(self._asked_at) > _OUTSTANDING:
-                del self._asked_at[next(iter(self._asked_at))]
-            out.append(mavlink.MAVLink_timesync_message(0, stamp))
-        return out
+        return out + self._clock.due(now)
 
     def _take(self, frame: Frame, now: float, peer: Peer) -> Received:
         message = frame.message
@@ -297,9 +283,10 @@ class LinkState:
         lost = self._sequence.heard(frame.sequence)
         self._meter.heard(message.get_type(), lost, now)
         self._last_heard = now
-        self._watch_clock(message, now)
-        if message.get_type() == "TIMESYNC":
-            self._take_timesync(message, now)
+        if self._clock.heard(message, now):
+            self._sequence.restart()
+            self._events.append(VehicleRebooted(now))
+            self._ask_again()
         if self._identification is not None:
             self._identification.heard(message)
         if self._streams is not None:
@@ -354,27 +341,6 @@ class LinkState:
         if found != self._known and not unanswered:
             self._known = found
             self._events.append(VehicleFound(now, found))
-
-    def _take_timesync(self, message: Message, now: float) -> None:
-        asked = self._asked_at.pop(message.ts1, None) if message.tc1 != 0 else None
-        if asked is not None:
-            self._round_trip_s = now - asked
-
-    def _watch_clock(self, message: Message, now: float) -> None:
-        boot_ms = getattr(message, "time_boot_ms", None)
-        if boot_ms is None:
-            return
-        if boot_ms >= self._boot_ms - _CLOCK_BACK_MS:
-            self._boot_suspects = 0
-            self._boot_ms = max(self._boot_ms, boot_ms)
-            return
-        self._boot_suspects += 1
-        if self._boot_suspects >= _CLOCK_BACK_TIMES:
-            self._boot_suspects = 0
-            self._boot_ms = boot_ms
-            self._sequence.restart()
-            self._events.append(VehicleRebooted(now))
-            self._ask_again()
 
     def _ask_again(self) -> None:
         """Take nothing for granted: another vehicle may be there, or this one has forgotten."""

@@ -9,16 +9,19 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from magcomp import autopilots
 from magcomp.compensate import Compensator, Fusion, Motion, Reading, fuse
-from magcomp.fit.flight import LAG_MEAN_S
+from magcomp.errors import MissingDataError
 from magcomp.geometry import gravity_direction
 from magcomp.mavlink.header import message_id, source
 from magcomp.mavlink.messages import Message, decode_frame
-from magcomp.model import CURRENT, InForce, Recording, Vehicle, quantity_of
+from magcomp.model import CURRENT, InForce, Recording, Series, Vehicle, quantity_of
 
-_FIELD_MESSAGES = {1: Message.RAW_IMU, 2: Message.SCALED_IMU2, 3: Message.SCALED_IMU3}
-_USED = frozenset((Message.RAW_IMU, Message.ATTITUDE, Message.VFR_HUD, Message.BATTERY_STATUS))
+_USED = frozenset((Message.ATTITUDE, Message.VFR_HUD, Message.BATTERY_STATUS))
+_LINK_FORMAT = "tlog"
+_MESSAGES = 3
 _LOOK_S = 0.2
 _MEMORY = 64
 """Attitudes kept: a second and more of the 50 Hz asked for."""
@@ -52,7 +55,21 @@ class Sensors:
     Parameters
     ----------
     compass
-        1, 2 or 3.
+        Its number.
+    vehicle
+        Others on the link are left out.
+    values
+        Its parameters by name.
+
+    Attributes
+    ----------
+    uncorrected
+        The readings are the sensor's own, not what the autopilot made of them.
+
+    Raises
+    ------
+    MissingDataError
+        The vehicle has no such compass, as far as its parameters tell.
 
     Notes
     -----
@@ -61,9 +78,20 @@ class Sensors:
     estimated one.
     """
 
-    def __init__(self, compass: int) -> None:
-        self._field_message = _FIELD_MESSAGES[compass]
-        self._wanted = _USED | {self._field_message}
+    def __init__(self, compass: int, vehicle: Vehicle, values: Mapping[str, float]) -> None:
+        self._autopilot = autopilots.of(vehicle)
+        told = self._autopilot.compass_messages(values)
+        if compass not in told:
+            raise MissingDataError(
+                f"The vehicle must have a compass {compass}; instead it sends "
+                f"{', '.join(map(str, told)) or 'none whose calibration is known'}"
+            )
+        self._compass, self._vehicle, self._values = compass, vehicle, values
+        self._field_message = Message[told[compass]]
+        self._gyro_message = Message[self._autopilot.first_compass_message]
+        self._lag_s = self._autopilot.lag_priors(_LINK_FORMAT).field.mean
+        self._wanted = _USED | {self._field_message, self._gyro_message}
+        self.uncorrected = compass in self._in_body((0.0, 0.0, 1.0))[1]
         self._frames: queue.SimpleQueue[bytes] = queue.SimpleQueue()
         self._attitudes: deque[tuple[float, float, float]] = deque(maxlen=_MEMORY)
         self._field: tuple[float, float, float] | None = None
@@ -73,15 +101,16 @@ class Sensors:
         if message_id(frame) in self._wanted:
             self._frames.put(frame)
 
-    def events(
-        self, vehicle: Vehicle, regressor: str | None, over: Callable[[], bool]
-    ) -> Iterator[Motion | Reading]:
+    @property
+    def empty(self) -> bool:
+        """Whether every frame taken so far was used."""
+        return self._frames.empty()
+
+    def events(self, regressor: str | None, over: Callable[[], bool]) -> Iterator[Motion | Reading]:
         """Sensor events as they arrive, until ``over``.
 
         Parameters
         ----------
-        vehicle
-            Others on the link are left out.
         regressor
             The control quantity that a reading carries; None where none is needed.
         over
@@ -93,7 +122,7 @@ class Sensors:
                 frame = self._frames.get(timeout=_LOOK_S)
             except queue.Empty:
                 continue
-            if source(frame) != (vehicle.system, vehicle.component):
+            if source(frame) != (self._vehicle.system, self._vehicle.component):
                 continue
             message = message_id(frame)
             content = decode_frame(frame, message)
@@ -113,12 +142,21 @@ class Sensors:
         # A compass the autopilot does not have is reported as exactly (0, 0, 0).
         if message == self._field_message and any(field) and field != self._field:
             self._field = field
-            measured = time - LAG_MEAN_S
+            measured = time - self._lag_s
             roll, pitch = self._lean(measured)
-            yield Reading(measured, field, u, roll, pitch)
-        if message == Message.RAW_IMU:
+            x, y, z = self._in_body(field)[0][self._compass].value[0].tolist()
+            yield Reading(measured, (x, y, z), u, roll, pitch)
+        if message == self._gyro_message:
             gyro = tuple(1e-3 * float(content[name]) for name in ("xgyro", "ygyro", "zgyro"))
             yield Motion(time, gyro, gravity_direction(*self._lean(time)).tolist())
+
+    def _in_body(
+        self, field: tuple[float, float, float]
+    ) -> tuple[Mapping[int, Series], frozenset[int]]:
+        """What the compass's message says, as a vehicle's axes have it."""
+        said = Series(np.zeros(1), np.array([field]))
+        told = dict.fromkeys(range(1, _MESSAGES + 1), said)
+        return self._autopilot.from_telemetry(told, self._values)
 
     def _lean(self, time: float) -> tuple[float, float]:
         """Roll and pitch of the attitude nearest to a moment."""
@@ -128,7 +166,6 @@ class Sensors:
 
 def live_headings(
     sensors: Sensors,
-    vehicle: Vehicle,
     wanted: InForce,
     present: InForce,
     declination: float,
@@ -140,8 +177,6 @@ def live_headings(
     ----------
     sensors
         A sink of the vehicle's link.
-    vehicle
-        Whose heading.
     wanted, present
         The correction to show, and the one the autopilot applies already.
     declination
@@ -155,15 +190,20 @@ def live_headings(
         The two corrections multiply different control quantities.
     """
     regressor = wanted.regressor or present.regressor
-    compensator = Compensator.over(wanted.correction, present, regressor or CURRENT, declination)
-    unchanged = Compensator.over(present.correction, present, regressor or CURRENT, declination)
-    raw = math.nan
+    kind = regressor or CURRENT
+    compensator = Compensator.over(wanted.correction, present, kind, declination)
+    unchanged = Compensator.over(present.correction, present, kind, declination)
+    if sensors.uncorrected:
+        compensator = Compensator(wanted.correction, declination)
+        unchanged = Compensator(present.correction, declination)
+    raw, multiplies = math.nan, sensors.uncorrected and present.regressor is not None
 
     def watched() -> Iterator[Motion | Reading]:
         nonlocal raw
-        for event in sensors.events(vehicle, regressor, over):
+        for event in sensors.events(regressor, over):
             if isinstance(event, Reading):
-                raw = unchanged.correct(event.field, 0.0, event.roll, event.pitch)
+                u = event.u if multiplies else 0.0
+                raw = unchanged.correct(event.field, u, event.roll, event.pitch)
             yield event
 
     for answer in fuse(watched(), compensator, Fusion()):
@@ -182,7 +222,7 @@ def corrections(
     chosen
         Values to be taken instead; empty for the correction in force.
     compass
-        1, 2 or 3.
+        Its number.
     """
     autopilot, present = autopilots.of(recording), recording.parameters.latest
     return (

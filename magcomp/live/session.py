@@ -12,7 +12,7 @@ import threading
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Self, TypeVar
 
 from magcomp.analysis.analyse import Options, Progress, analyse
 from magcomp.buffer import Buffer
@@ -38,6 +38,8 @@ from magcomp.model import Analysis, ParameterSet, Recording, Vehicle
 from magcomp.writing.events import Event, Outcome
 from magcomp.writing.files import is_own
 from magcomp.writing.plan import WritePlan
+
+_Result = TypeVar("_Result")
 
 
 def _silent(_: object) -> None:
@@ -281,6 +283,12 @@ class LiveSession:
         if self._refitter is not None:
             self._refitter.close()
         self._tap.stop()
+
+    def alone(self, work: Callable[[Connection, Vehicle, Latest, Clock], _Result]) -> _Result:
+        """Let somebody speak with the vehicle while nobody else does; see magcomp.live.sweep."""
+        with self._asked:
+            self.connection.discard()
+            return work(self.connection, self._known_vehicle(), self._tap.latest, self._clock)
 
     # ---------------------------------------------------------------- writing
 

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 
 from magcomp import autopilots
-from magcomp.autopilots import Autopilot
 from magcomp.buffer import Coverage
 from magcomp.geometry import heading
 from magcomp.link import LinkStatistics
@@ -255,7 +254,8 @@ def warnings(
     """
     autopilot = autopilots.of(vehicle)
     yield from autopilot.warnings(parameters)
-    yield from _on_compasses(now, vehicle, autopilot, streaming_s)
+    yield from autopilot.link_notes(len(vehicle.compasses))
+    yield from _on_compasses(now, vehicle, parameters, streaming_s)
     if streaming_s > 3.0 and now.current is None:
         yield "there is no current sensor: throttle is used, which changes with the battery"
     if (regressor := autopilot.regressor(parameters)) is not None:
@@ -295,8 +295,9 @@ def slow_streams(
 
 
 def _on_compasses(
-    now: Now, vehicle: Vehicle, autopilot: Autopilot, streaming_s: float
+    now: Now, vehicle: Vehicle, parameters: Mapping[str, float], streaming_s: float
 ) -> Iterator[str]:
+    autopilot = autopilots.of(vehicle)
     if streaming_s > 3.0 and not now.fields:
         yield f"no compass reports: {autopilot.no_compass_hint()}"
     elif streaming_s > 3.0 and len(now.fields) < len(vehicle.device_ids):
@@ -304,12 +305,11 @@ def _on_compasses(
         yield f"{_compasses(missing)} of {len(vehicle.device_ids)} does not report"
     if now.compass_trouble:
         yield "the autopilot says that its compass is not healthy"
-    for number, field in sorted(now.fields.items()):
-        strength = math.hypot(*field)
-        if not _PLAUSIBLE[0] < strength < _PLAUSIBLE[1]:
+    for compass in compasses_now(now, vehicle, parameters, Refit()):
+        if not compass.healthy:
             yield (
-                f"compass {number} reads {strength:.0f} mGauss: the earth's field is "
-                "between 220 and 670"
+                f"compass {compass.number} reads {compass.strength:.0f} mGauss: the earth's field "
+                "is between 220 and 670"
             )
 
 

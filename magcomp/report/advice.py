@@ -52,7 +52,9 @@ def steps(document: Document, options: Options | None = None) -> tuple[str, ...]
             *(_doubt(c, "") for c in document["compasses"] if c["verdict"] == "rejected"),
         )
     switch = autopilots.named(document["vehicle"]["autopilot"]).switch
-    found = [_write(document, sorted(kept), options), *_each(document)]
+    every = list(_each(document))
+    leads = 1 if every and any(role.leads for role in roles(document)) else 0
+    found = [*every[:leads], _write(document, sorted(kept), options), *every[leads:]]
     for compass in document["compasses"]:
         if compass["verdict"] == "marginal":
             found.append(_doubt(compass, "Until a better log says otherwise, fly with care"))
@@ -66,12 +68,13 @@ def steps(document: Document, options: Options | None = None) -> tuple[str, ...]
 
 
 def _each(document: Document) -> Iterator[str]:
-    """Which compass the autopilot uses, and what to do with each, where there are several."""
+    """What to do with each compass where there are several, first with the one flown on."""
     every = roles(document)
     if len(every) > 1:
         for role in every:
             use = f", {role.use}" if role.use else ""
-            yield f"Compass {role.compass}{use}: {role.action}."
+            who = f"Your vehicle flies on compass {role.compass}"
+            yield f"{who if role.leads else f'Compass {role.compass}{use}'}: {role.action}."
 
 
 def _write(document: Document, kept: list[int], options: Options | None) -> str:

@@ -15,13 +15,13 @@ from magcomp.analysis import Options, parameter_set
 from magcomp.model import Analysis, Grade, Recording
 from magcomp.report import advice, as_json, html_tables, plain, words
 from magcomp.report.evidence import CompassPlots, compass_plots
-from magcomp.report.figure import Figure, quantity_of
+from magcomp.report.figure import Figure, Quantity, quantity_of
 from magcomp.report.figures import figures
 from magcomp.report.html_page import page
 from magcomp.report.html_parts import Numbers, templates
 from magcomp.writing.files import format_parameters
 
-_EVIDENCE = ("cloud", "centres", "shift", "strength", "residuals")
+_EVIDENCE = ("shift", "strength", "residuals")
 
 _METHODS = {
     "sweep": "sweep (the vehicle stood still while the motors worked)",
@@ -120,8 +120,21 @@ def _panel(
         "method": _METHODS.get(compass["method"], compass["method"]),
         "why": compass["why"],
         "quantity": quantity.name,
+        **_slider(compass, quantity),
         "origin": compass["origin"],
         "count": compass["count"],
+    }
+
+
+def _slider(compass: Mapping[str, Any], quantity: Quantity) -> dict[str, Any]:
+    """From rest to the end of the table of heading errors, in the unit that is shown."""
+    most = quantity.scale * max(row["u"] for row in plain.table_rows(compass))
+    return {
+        "most": f"{most:.0f}",
+        "step": f"{max(most / 100, 0.5):g}",
+        "quoted": f"{quantity.scale * compass['quoted']['u']:.1f}",
+        "unit": quantity.unit,
+        "scale": f"{quantity.scale:g}",
     }
 
 

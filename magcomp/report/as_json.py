@@ -1,7 +1,7 @@
 """An analysis as one JSON object: the form that scripts rely on.
 
-Keys are added, never renamed. A number that does not exist is null; NaN and infinity never
-appear.
+Keys are added, never renamed; docs/schema/ names them all. A number that does not exist is null;
+NaN and infinity never appear.
 """
 
 from __future__ import annotations
@@ -79,10 +79,15 @@ def dumps(document: Mapping[str, Any]) -> str:
     return json.dumps(_finite(document), indent=2, allow_nan=False) + "\n"
 
 
+SCHEMA = 1
+"""Of docs/schema/: grows only when a key goes or changes its meaning."""
+
+
 def head(source: str, duration_s: float, vehicle: Vehicle) -> dict[str, Any]:
     """What every object of a log begins with."""
     return {
         "magcomp": __version__,
+        "schema": SCHEMA,
         "source": source,
         "duration_s": round(duration_s, 3),
         "vehicle": {
@@ -133,7 +138,7 @@ def _compass(result: CompassResult) -> dict[str, Any]:
             {"u": row.u, "before": row.before, "after": row.after, "p95": row.p95}
             for row in verdict.heading_error
         ],
-        "quoted": _quoted(verdict),
+        "quoted": quoted(verdict),
         "coverage": _coverage(verdict.coverage),
         "free": sorted(fit.free),
         "earth_mgauss": {"strength": fit.strength, "vertical": fit.vertical},
@@ -167,7 +172,7 @@ def _compass(result: CompassResult) -> dict[str, Any]:
     }
 
 
-def _quoted(verdict: Verdict) -> dict[str, float | bool]:
+def quoted(verdict: Verdict) -> dict[str, float | bool]:
     """The one row of the heading errors that every sentence and card quotes.
 
     It is the hover's, or the highest control quantity's where only there something is gained.

@@ -6,6 +6,7 @@ correction is applied to them.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,15 +16,19 @@ from magcomp.errors import MissingDataError
 from magcomp.fit import departures, residuals
 from magcomp.geometry import heading
 from magcomp.judge.evidence import used_lags
+from magcomp.judge.heading_error import level_errors, multiplied_in_force, present_by
 from magcomp.model import (
     CompassResult,
     Control,
     FloatArray,
+    InForce,
     IntArray,
     MotorFit,
     Recording,
     Samples,
 )
+from magcomp.report import as_json
+from magcomp.report.strip import Strip, strip
 
 MOST_POINTS = 1500
 """Readings a picture is drawn from; more only make it slower."""
@@ -71,6 +76,11 @@ class CompassPlots:
         Median rate of new readings; NaN for fewer than two.
     longest_gap_s
         Longest time without a reading.
+    level_errors
+        Heading error of the correction in force over a level turn at the control quantity that is
+        quoted, radians, at true headings 0°, 10° … 350°, shape (36,).
+    strip
+        Which parts of the recording were used.
     """
 
     compass: int
@@ -91,6 +101,8 @@ class CompassPlots:
     count: int
     rate_hz: float
     longest_gap_s: float
+    level_errors: FloatArray
+    strip: Strip
 
 
 def compass_plots(
@@ -120,7 +132,9 @@ def compass_plots(
         Where the recording is not the one the result was fitted on.
     """
     fit = result.fit
-    samples = _samples(recording, fit, start, end)
+    samples, present, in_force = _samples(recording, fit, start, end)
+    quoted = np.array([as_json.quoted(result.verdict)["u"]])
+    multiplied = multiplied_in_force(quoted, present.regressor, fit, in_force, samples)
     corrected = fit.correction.apply(samples.raw, samples.u)
     parts, before, after = _unexplained(fit, samples, corrected)
     keep = _thinned(len(samples), most)
@@ -145,16 +159,26 @@ def compass_plots(
         count=len(samples),
         rate_hz=float(1.0 / np.median(steps)) if len(steps) else np.nan,
         longest_gap_s=float(steps.max()) if len(steps) else np.nan,
+        level_errors=level_errors(
+            fit,
+            present_by(present, in_force, samples),
+            float(quoted[0]),
+            float(multiplied[0]),
+        ),
+        strip=strip(recording, samples.time),
     )
 
 
-def _samples(recording: Recording, fit: MotorFit, start: float, end: float) -> Samples:
+def _samples(
+    recording: Recording, fit: MotorFit, start: float, end: float
+) -> tuple[Samples, InForce, Mapping[str, Control]]:
+    """The readings as the fit saw them, what was in force at their end, and what it multiplies."""
     found = controls(recording)
     forms = currents_of_motors(recording) if fit.numbers else found
     control = _control(forms, fit, recording.source)
     in_force = {**to_undo(recording, found), control.kind: control}
     new = readings(recording, fit.compass, start=start, end=end)
-    return sample(new, control, in_force, used_lags(fit))
+    return sample(new, control, in_force, used_lags(fit)), new.in_force[-1], in_force
 
 
 def _control(found: tuple[Control, ...], fit: MotorFit, source: str) -> Control:

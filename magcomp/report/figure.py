@@ -44,6 +44,8 @@ class Figure:
         Pixels.
     wide
         Whether it deserves the whole width of the page.
+    play
+        What moves in it when the reader moves the control quantity, as the page's script takes it.
     """
 
     name: str
@@ -53,6 +55,7 @@ class Figure:
     layout: Mapping[str, Any]
     height: int = 320
     wide: bool = False
+    play: Mapping[str, Any] | None = None
 
 
 @dataclass(frozen=True)

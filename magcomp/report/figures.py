@@ -30,7 +30,8 @@ from magcomp.report.figure import (
     quantity_of,
     rounded,
 )
-from magcomp.report.figures_cloud import centres, cloud
+from magcomp.report.figures_cloud import cloud
+from magcomp.report.figures_flight import missions, strip
 
 _MEDIANS = 12
 _LEAST_IN_MEDIAN = 8
@@ -49,13 +50,14 @@ def figures(result: CompassResult, plots: CompassPlots) -> tuple[Figure, ...]:
     quantity = quantity_of(result.fit.regressor)
     return (
         heading_error(result, quantity),
+        missions(result, plots, quantity),
         cloud(result, plots, quantity),
-        centres(result, quantity),
         shift(result, quantity),
         strength(result, plots, quantity),
         unexplained(result, plots, quantity),
         sphere(result, plots),
         turn(plots, quantity),
+        strip(plots),
     )
 
 

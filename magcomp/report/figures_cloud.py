@@ -9,7 +9,7 @@ import numpy as np
 
 from magcomp.model import CompassResult, FloatArray, Level, MotorFit
 from magcomp.report.evidence import CompassPlots
-from magcomp.report.figure import GRID, INK, SCALE, Figure, Quantity, Trace, rounded, shade
+from magcomp.report.figure import BEFORE, GRID, INK, SCALE, Figure, Quantity, Trace, rounded, shade
 
 _MOST_ELLIPSOIDS = 5
 _FLIGHT_ELLIPSOIDS = 2
@@ -17,59 +17,88 @@ _MARGIN = 1.04
 _CHI2_95 = 7.815
 """95 % quantile of χ² with three degrees of freedom."""
 
+Moment = float | list[float] | str | None
+Part = tuple[Trace, Moment]
+"""A trace, and the control quantity that it belongs to: one for all its points, one for each, that
+of its points' colours (:data:`_OWN`), or, where it moves, none."""
+
+_OWN = "color"
+
 SPACE_HEIGHT = 460
 """Height of a picture in space, pixels."""
 
 
 def cloud(result: CompassResult, plots: CompassPlots, quantity: Quantity) -> Figure:
-    """Raw field in space with the ellipsoids of the levels and the line through their centres.
+    """Raw field in space with the ellipsoids of the levels, and beside it their centres near by.
 
     Where the vehicle stood still there is no ellipsoid: the readings less the earth's part are
     drawn about the line itself.
     """
     fit = result.fit
-    still = fit.method == "sweep"
     raw = plots.raw
-    if still:
+    if fit.method == "sweep":
         centres = np.array([fit.correction.centre(float(u)) for u in plots.u])
         raw = raw - np.median(raw - centres, axis=0)
-    levels = () if still else _drawn(fit)
+    levels = () if fit.method == "sweep" else _drawn(fit)
     top = float(quantity.scale * max(plots.u.max(), max((lv.u for lv in fit.levels), default=0.0)))
     shades = {"colorscale": SCALE, "cmin": 0.0, "cmax": top}
-    data = [
-        _points(raw, quantity.values(plots.u, 1), quantity, shades),
-        *(_ellipsoid(fit, level, quantity, top) for level in levels),
+    far: list[Part] = [
+        (_points(raw, quantity.values(plots.u, 1), quantity, shades), _OWN),
+        *((_ellipsoid(fit, level, quantity, top), quantity.scale * level.u) for level in levels),
         *_line_of_centres(fit, quantity),
+        *([(_shell(fit), None)] if levels else []),
+        (_centre(fit, 6), None),
     ]
+    near: list[Part] = [
+        *((_doubt(level, quantity, top), quantity.scale * level.u) for level in fit.levels),
+        *_line_of_centres(fit, quantity),
+        (_centre(fit, 9), None),
+    ]
+    ends = np.stack([fit.correction.centre(u) for u in (0.0, _most(result))])
     return Figure(
         "cloud",
         "The field in space",
         _caption(fit, quantity, len(levels)),
-        data,
-        space(_corners(data)),
+        [trace for trace, _ in far] + [trace | {"scene": "scene2"} for trace, _ in near],
+        _two(_corners([trace for trace, _ in far]), _corners([trace for trace, _ in near], ends)),
         height=SPACE_HEIGHT,
+        wide=True,
+        play=_play(fit, quantity, [u for _, u in [*far, *near]]),
     )
 
 
-def centres(result: CompassResult, quantity: Quantity) -> Figure:
-    """The centres near by: each with its 95 % ellipsoid, and the line through them."""
-    fit = result.fit
-    top = float(quantity.scale * max((level.u for level in fit.levels), default=1.0))
-    data = [
-        *(_doubt(level, quantity, top) for level in fit.levels),
-        *_line_of_centres(fit, quantity),
-    ]
-    off = 0.0 if fit.line is None else fit.line.rms
-    return Figure(
-        "centres",
-        "The line of centres",
-        f"The same centres near by, each in the ellipsoid it lies in with 95 % probability: they "
-        f"stand {off:.{1 if off >= 0.1 else 2}f} mGauss off the straight line that the method "
-        "rests on.",
-        data,
-        space(_corners(data)),
-        height=SPACE_HEIGHT,
-    )
+def _most(result: CompassResult) -> float:
+    """The largest control quantity that the table of heading errors has."""
+    return max((row.u for row in result.verdict.heading_error), default=result.fit.u_high)
+
+
+def _play(fit: MotorFit, quantity: Quantity, u: list[Moment]) -> dict[str, Any]:
+    """What the page's script moves: docs/method.md, Equation 6, per unit as it is shown."""
+    correction = fit.correction
+    slope = correction.centre(1.0) - correction.centre(0.0)
+    return {
+        "u": u,
+        "slope": rounded(slope / quantity.scale, 5),
+        "offset": rounded(correction.offset, 3),
+        "soft_iron": rounded(correction.soft_iron, 5),
+        "motor": rounded(correction.vector / quantity.scale, 5),
+    }
+
+
+def _shell(fit: MotorFit) -> Trace:
+    """The ellipsoid at rest, which the page's script moves along the line of centres."""
+    surface = np.linalg.solve(fit.correction.soft_iron, fit.strength * wires().T).T
+    return _lines(fit.correction.centre(0.0) + surface, "ellipsoid", BEFORE)
+
+
+def _centre(fit: MotorFit, size: int) -> Trace:
+    """The centre at rest, to be moved too."""
+    x, y, z = ([value] for value in rounded(fit.correction.centre(0.0), 2))
+    return {
+        **{"type": "scatter3d", "mode": "markers", "name": "centre", "x": x, "y": y, "z": z},
+        "marker": {"color": BEFORE, "size": size},
+        "hovertemplate": "%{x:.1f}, %{y:.1f}, %{z:.1f} mGauss<extra>centre</extra>",
+    }
 
 
 def _doubt(level: Level, quantity: Quantity, top: float) -> Trace:
@@ -93,14 +122,16 @@ def _caption(fit: MotorFit, quantity: Quantity, ellipsoids: int) -> str:
     if fit.method == "sweep":
         return (
             "The vehicle stood still, so there is no ellipsoid to see: the readings, less the "
-            f"earth's field, move along the line of centres as the {quantity.name} grows (drag to "
-            "turn)."
+            f"earth's field, move along the line of centres as the {quantity.name} grows, near by "
+            "beside it (drag to turn)."
         )
     length = 0.0 if fit.line is None else float(np.ptp(fit.line.positions))
+    off = 0.0 if fit.line is None else fit.line.rms
     return (
         f"Every reading lies on an ellipsoid whose centre moves as the {quantity.name} grows: "
-        f"{ellipsoids} ellipsoids are drawn, and their centres lie on a line {length:.0f} mGauss "
-        "long (drag to turn)."
+        f"{ellipsoids} ellipsoids are drawn; beside it, near by, stand their centres in the "
+        f"ellipsoids they lie in with 95 % probability, {off:.{1 if off >= 0.1 else 2}f} mGauss "
+        f"off a straight line {length:.0f} mGauss long (drag to turn)."
     )
 
 
@@ -109,6 +140,7 @@ def _points(raw: FloatArray, u: list[float], quantity: Quantity, shades: dict[st
         "title": {"text": quantity.title, "side": "right"},
         "thickness": 8,
         "len": 0.6,
+        "x": 0.59,
         "outlinewidth": 0,
     }
     x, y, z = rounded(raw.T, 1)
@@ -132,15 +164,20 @@ def _ellipsoid(fit: MotorFit, level: Level, quantity: Quantity, top: float) -> T
 
 
 def _wired(surface: FloatArray, level: Level, quantity: Quantity, top: float) -> Trace:
-    x, y, z = ([None if np.isnan(v) else v for v in row] for row in rounded(surface.T, 2))
+    colour = shade(quantity.scale * level.u / top if top else 0.0)
+    return _lines(surface, f"ellipsoid at {quantity.text(level.u)}", colour)
+
+
+def _lines(surface: FloatArray, name: str, colour: str) -> Trace:
+    x, y, z = ([None if np.isnan(v) else v for v in row] for row in rounded(surface.T, 1))
     return {
         "type": "scatter3d",
         "mode": "lines",
-        "name": f"ellipsoid at {quantity.text(level.u)}",
+        "name": name,
         "x": x,
         "y": y,
         "z": z,
-        "line": {"color": shade(quantity.scale * level.u / top if top else 0.0), "width": 2},
+        "line": {"color": colour, "width": 2},
         "opacity": 0.6,
         "showlegend": False,
         "hoverinfo": "name",
@@ -172,7 +209,7 @@ def wires(
     return np.vstack(circles)
 
 
-def _line_of_centres(fit: MotorFit, quantity: Quantity) -> list[Trace]:
+def _line_of_centres(fit: MotorFit, quantity: Quantity) -> list[Part]:
     if fit.line is None or not fit.levels:
         return []
     ends = np.array([fit.line.positions.min(), fit.line.positions.max()])
@@ -180,39 +217,56 @@ def _line_of_centres(fit: MotorFit, quantity: Quantity) -> list[Trace]:
     lx, ly, lz = rounded(reach.T, 2)
     cx, cy, cz = rounded(np.array([level.centre for level in fit.levels]).T, 2)
     text = [f"centre at {quantity.text(level.u)}" for level in fit.levels]
-    return [
-        {
-            "type": "scatter3d",
-            "mode": "lines",
-            "name": "line of centres",
-            "x": lx,
-            "y": ly,
-            "z": lz,
-            "line": {"color": INK, "width": 5},
-            "hoverinfo": "name",
-        },
-        {
-            "type": "scatter3d",
-            "mode": "markers",
-            "name": "centres",
-            "x": cx,
-            "y": cy,
-            "z": cz,
-            "marker": {"color": INK, "size": 4, "symbol": "diamond"},
-            "text": text,
-            "hovertemplate": "%{text}: %{x:.1f}, %{y:.1f}, %{z:.1f} mGauss<extra></extra>",
-        },
-    ]
+    u = quantity.values([level.u for level in fit.levels])
+    first, last = int(np.argmin(fit.line.positions)), int(np.argmax(fit.line.positions))
+    line: Trace = {
+        **{"type": "scatter3d", "mode": "lines", "name": "line of centres"},
+        **{"x": lx, "y": ly, "z": lz, "hoverinfo": "name"},
+        "line": {"color": INK, "width": 5},
+    }
+    points: Trace = {
+        **{"type": "scatter3d", "mode": "markers", "name": "centres", "x": cx, "y": cy, "z": cz},
+        "marker": {"color": INK, "size": 4, "symbol": "diamond"},
+        "text": text,
+        "hovertemplate": "%{text}: %{x:.1f}, %{y:.1f}, %{z:.1f} mGauss<extra></extra>",
+    }
+    return [(line, [u[first], u[last]]), (points, u)]
 
 
-def _corners(data: Sequence[Trace]) -> FloatArray:
-    """Lowest and highest value on each axis, shape (2, 3); zeros for an empty picture."""
+def _corners(data: Sequence[Trace], points: FloatArray | None = None) -> FloatArray:
+    """Lowest and highest value on each axis, of traces and of more points, shape (2, 3)."""
     columns = [
         [value for trace in data for value in trace[name] if value is not None] for name in "xyz"
     ]
-    if not columns[0]:
-        return np.zeros((2, 3))
-    return np.array([[min(c) for c in columns], [max(c) for c in columns]])
+    more = np.empty((0, 3)) if points is None else points
+    every = np.vstack([np.array(columns).T, more])
+    return np.stack([every.min(axis=0), every.max(axis=0)])
+
+
+def _two(far: FloatArray, near: FloatArray) -> dict[str, Any]:
+    """Layout of a picture in space and, beside it, of what is too small to be seen in it."""
+    whole, part = space(far), space(near)
+    return {
+        **whole,
+        "scene": {**whole["scene"], "domain": {"x": [0.0, 0.58], "y": [0.0, 1.0]}},
+        "scene2": {
+            **part["scene"],
+            **{f"{axis}axis": _near_axis(part["scene"][f"{axis}axis"]) for axis in "xyz"},
+            "domain": {"x": [0.66, 1.0], "y": [0.0, 0.95]},
+            "camera": {"eye": {"x": 1.8, "y": -1.8, "z": 0.8}},
+        },
+        "annotations": [
+            {
+                **{"text": "the centres, near by", "showarrow": False, "font": {"size": 12}},
+                **{"xref": "paper", "yref": "paper", "x": 0.83, "y": 1.0},
+            }
+        ],
+    }
+
+
+def _near_axis(axis: dict[str, Any]) -> dict[str, Any]:
+    """An axis with a name that fits a small picture; the large one beside it tells the unit."""
+    return {**axis, "title": {"text": axis["title"]["text"].partition(" ")[0]}, "nticks": 4}
 
 
 def space(corners: FloatArray | None = None) -> dict[str, Any]:

@@ -2,29 +2,21 @@
 
 from __future__ import annotations
 
+import base64
+import gzip
 import json
 from collections.abc import Mapping
+from functools import cache
 from importlib.resources import files
 
-from markupsafe import Markup
-
 from magcomp.report.figure import Figure
-from magcomp.report.html_parts import figure, templates
-
-ASSETS = files("magcomp.report") / "assets"
+from magcomp.report.html_parts import templates
 
 
-def canvas(name: str, picture: Figure) -> Markup:
-    """Where a picture is drawn, with its title and caption.
-
-    Parameters
-    ----------
-    name
-        Unique on the page, and the figure's name in :func:`page`.
-    picture
-        The picture.
-    """
-    return figure(name, picture)
+@cache
+def asset(name: str) -> str:
+    """The style or the script of every page."""
+    return (files("magcomp.report") / "assets" / name).read_text(encoding="utf-8")
 
 
 def page(title: str, body: str, source: str, pictures: Mapping[str, Figure]) -> str:
@@ -35,32 +27,38 @@ def page(title: str, body: str, source: str, pictures: Mapping[str, Figure]) -> 
     title
         Of the window.
     body
-        HTML, with a :func:`canvas` for each picture.
+        HTML, with the template's ``figure`` for each picture.
     source
         The JSON document whose numbers the page shows.
     pictures
         By the name of their canvas.
     """
-    # plotly is only a carrier of its script here, and slow to import.
-    from plotly.offline import get_plotlyjs  # noqa: PLC0415
-
-    style, script = (
-        (ASSETS / name).read_text(encoding="utf-8") for name in ("report.css", "report.js")
-    )
-    drawn = {name: {"data": each.data, "layout": each.layout} for name, each in pictures.items()}
+    drawn = {
+        name: {"data": each.data, "layout": each.layout, "play": each.play}
+        for name, each in pictures.items()
+    }
     return (
         templates()
         .get_template("page.html.j2")
         .render(
             title=title,
-            style=style,
-            script=script,
+            style=asset("report.css"),
+            script=asset("report.js"),
             body=body,
             source=_inert(source),
             figures=_inert(json.dumps(drawn, separators=(",", ":"), allow_nan=False)),
-            plotly=get_plotlyjs(),
+            plotly=_plotly(),
         )
     )
+
+
+@cache
+def _plotly() -> str:
+    """The script of plotly, packed: four megabytes and a half become less than two."""
+    # plotly is only a carrier of its script here, and slow to import.
+    from plotly.offline import get_plotlyjs  # noqa: PLC0415
+
+    return base64.b64encode(gzip.compress(get_plotlyjs().encode(), mtime=0)).decode()
 
 
 def _inert(content: str) -> str:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from magcomp.report import words
@@ -22,10 +22,11 @@ DASH = "–"
 
 
 @cache
-def templates() -> Environment:
-    """The templates of all pages."""
+def templates(package: str = "magcomp.report") -> Environment:
+    """The templates of a package, and with them those that all pages are made of."""
+    packages = dict.fromkeys((package, "magcomp.report"))
     environment = Environment(
-        loader=PackageLoader("magcomp.report"),
+        loader=ChoiceLoader([PackageLoader(each) for each in packages]),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
@@ -74,11 +75,6 @@ def minus(text: str) -> str:
     return text.replace("-", "\N{MINUS SIGN}")
 
 
-def text(words_: str) -> Markup:
-    """Text, escaped."""
-    return escape(words_)
-
-
 def with_code(words_: str) -> Markup:
     """Text, escaped; what stands between backticks is code."""
     parts = [
@@ -111,10 +107,4 @@ def badge(grade: str) -> Markup:
 def sign(grade: str) -> Markup:
     """A grade as a sign whose shape alone tells it."""
     made: Markup = _macros().sign(grade)
-    return made
-
-
-def figure(name: str, of: object) -> Markup:
-    """Where a picture is drawn, with its title and caption."""
-    made: Markup = _macros().figure(name, of)
     return made

@@ -31,15 +31,18 @@ class Role:
         What the autopilot does with it; empty where the recording does not say.
     action
         What to do with it, without a full stop.
+    leads
+        Whether the vehicle flies on it: its heading comes from this compass.
     """
 
     compass: int
     use: str
     action: str
+    leads: bool = False
 
 
 def roles(document: Document) -> tuple[Role, ...]:
-    """Every compass of an answer.
+    """Every compass of an answer, the one that the vehicle flies on first.
 
     Parameters
     ----------
@@ -54,16 +57,17 @@ def roles(document: Document) -> tuple[Role, ...]:
             number,
             _use(told.get(number, {}), number == first),
             _action(number, judged, told, first),
+            number == first,
         )
-        for number in judged
+        for number in sorted(judged, key=lambda number: (number != first, number))
     )
 
 
 def _first(document: Document, told: Mapping[int, Mapping[str, Any]]) -> int | None:
     """The compass the heading comes from; None where that does not follow from the slots."""
-    if not autopilots.named(document["vehicle"]["autopilot"]).first_slot_leads:
-        return None
     used = [slot for slot, compass in sorted(told.items()) if compass["used"]]
+    if len(used) > 1 and not autopilots.named(document["vehicle"]["autopilot"]).first_slot_leads:
+        return None
     return used[0] if used else None
 
 

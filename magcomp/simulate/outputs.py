@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from magcomp.autopilots.protocol import ThrustCurve
+from magcomp.autopilots.terms import ThrustCurve
 
 FloatArray = NDArray[np.float64]
 

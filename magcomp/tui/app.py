@@ -154,6 +154,7 @@ class MagcompApp(BaseApp):
             "disconnect": bool(work.source),
             "open_log": not work.source,
             "simulate": not work.source,
+            "manoeuvre": work.live,
             "write": work.live,
             "fly_again": self.simulation is not None and bool(self.writing.in_force),
             "undo": bool(self.writing.in_force),
@@ -173,6 +174,10 @@ class MagcompApp(BaseApp):
     def action_disconnect(self) -> None:
         """Close vehicle or log."""
         opening.leave(self)
+
+    def action_manoeuvre(self) -> None:
+        """Say how the vehicle is moved, or let it be found out."""
+        opening.next_manoeuvre(self)
 
     def action_fit(self) -> None:
         """Fit what is recorded so far."""
@@ -254,6 +259,9 @@ class MagcompApp(BaseApp):
             yield SystemCommand(
                 f"Go to {title}", "Step of the road", lambda s=step: self.action_go(s)
             )
+        yield SystemCommand(
+            "How it is moved", "Flown, on a stand, tied down", self.action_manoeuvre
+        )
         yield SystemCommand("Fit again", "What is recorded so far", self.action_fit)
         yield SystemCommand("Write to vehicle", "After a question", self.action_write)
         yield SystemCommand("Save parameter file", "For a ground station", self.action_save)

@@ -83,7 +83,8 @@ class BaseApp(App[None]):
     @property
     def state(self) -> State:
         """What the screens draw."""
-        return State(self.work, self.writing, self.live, self.busy, self.choices, self.asked)
+        said = None if self.session is None else self.session.manoeuvre
+        return State(self.work, self.writing, self.live, self.busy, self.choices, self.asked, said)
 
     def redraw(self) -> None:
         """Draw the step on the screen, whatever lies over it."""

@@ -11,13 +11,14 @@ from typing import Any
 from magcomp.analysis import Options
 from magcomp.errors import UsageError
 from magcomp.model import Analysis, Recording
+from magcomp.report.strip import loads
 from magcomp.tui import writing
 from magcomp.tui.base import BaseApp
 from magcomp.tui.pictures import CompassPicture
 from magcomp.tui.screens.dialogs import Fault
 from magcomp.tui.screens.time_range import TimeRange
 from magcomp.tui.services import Progress, fit
-from magcomp.tui.widgets.flight_strip import Strip, loads
+from magcomp.tui.widgets.flight_strip import Strip
 
 _Answer = tuple[Recording, Analysis, Mapping[int, CompassPicture]]
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from magcomp.analysis import Options
 from magcomp.errors import MagcompError
 from magcomp.link import Replay, SerialPort, parse_address
+from magcomp.live.situation import Manoeuvre
 from magcomp.model import Recording
 from magcomp.report import words
 from magcomp.tui.base import BaseApp
@@ -87,6 +88,14 @@ def leave(app: BaseApp) -> None:
     """Close vehicle or log; ask where results would be lost."""
     if app.work.source:
         _when_free(app, lambda: None)
+
+
+def next_manoeuvre(app: BaseApp) -> None:
+    """Take the next of the ways to move a vehicle as said; after the last it is found out again."""
+    if app.session is not None:
+        ways = (None, *Manoeuvre)
+        app.session.manoeuvre = ways[(ways.index(app.session.manoeuvre) + 1) % len(ways)]
+        app.redraw()
 
 
 def close(app: BaseApp) -> None:

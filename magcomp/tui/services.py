@@ -13,6 +13,7 @@ from typing import Protocol
 from magcomp.analysis import Options, analyse, check
 from magcomp.errors import LinkError, MagcompError, UsageError
 from magcomp.link import SerialPort, serial_ports
+from magcomp.live.situation import Manoeuvre
 from magcomp.live.snapshot import LiveSnapshot
 from magcomp.live.upload import new_file
 from magcomp.model import Analysis, ParameterSet, Recording, Vehicle, Verdict
@@ -31,7 +32,15 @@ _SERVE_S = 10.0
 
 
 class Session(Protocol):
-    """What the screens need of a live vehicle; `LiveSession` has it."""
+    """What the screens need of a live vehicle; `LiveSession` has it.
+
+    Attributes
+    ----------
+    manoeuvre
+        What the user says that is being done, None to find out; may be set at any time.
+    """
+
+    manoeuvre: Manoeuvre | None
 
     def snapshot(self) -> LiveSnapshot:
         """Everything a screen shows, now; cheap."""

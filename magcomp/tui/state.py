@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from magcomp.analysis import Options
+from magcomp.live.situation import Manoeuvre
 from magcomp.live.snapshot import LiveSnapshot
 from magcomp.tui.choices import Choice
 from magcomp.tui.work import Work, Writing
@@ -47,6 +48,8 @@ class State:
         What can be connected to or opened.
     asked
         Options of the fit tried last, whether or not it could be.
+    manoeuvre
+        What the user says that is being done with the vehicle; None where that is found out.
     """
 
     work: Work = field(default_factory=Work)
@@ -55,6 +58,7 @@ class State:
     busy: Busy | None = None
     choices: tuple[Choice, ...] = ()
     asked: Options = field(default_factory=Options)
+    manoeuvre: Manoeuvre | None = None
 
     @property
     def early(self) -> bool:

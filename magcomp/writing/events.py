@@ -8,7 +8,7 @@ from enum import Enum
 
 
 class Stage(Enum):
-    """Where a write is; see the table at the top of protocol.py."""
+    """Where a write is; see the table at the top of stages.py."""
 
     COMPARE = "compare"
     SETTLE = "settle"

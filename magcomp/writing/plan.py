@@ -155,7 +155,7 @@ def plan(
     return WritePlan(
         vehicle=vehicle,
         old=held,
-        new={n: v for n, v in asked.items() if not _is_switch(n) and v != held[n]},
+        new={n: asked[n] for n in _in_order(asked) if not _is_switch(n) and asked[n] != held[n]},
         switches={n: asked.get(n, v) for n, v in held.items() if _is_switch(n)},
         identity=identity,
         left_out=tuple(name for name in wanted.values if name not in asked),
@@ -165,6 +165,22 @@ def plan(
             *_warnings(vehicle, current, asked),
         ),
     )
+
+
+def _in_order(names: Iterable[str]) -> list[str]:
+    """Motor vectors before offsets before soft iron, each vector together; all else after them.
+
+    A firmware may look at its parameters in the midst of a write (docs/autopilots.md, PX4: in
+    force): what belongs together should arrive together.
+    """
+
+    def place(name: str) -> tuple[int, int]:
+        found = autopilots.parse(name)
+        if found is None or not found.kind.is_value:
+            return len(Kind), 0
+        return int(found.kind), found.compass
+
+    return sorted(names, key=place)
 
 
 def _held(current: Mapping[str, float], rest: Collection[str]) -> dict[str, float]:
@@ -301,5 +317,5 @@ def _warnings(
     vehicle: Vehicle, current: Mapping[str, float], asked: Mapping[str, float]
 ) -> list[str]:
     autopilot, after = autopilots.of(vehicle), {**current, **asked}
-    found = (*autopilot.warnings(after), *autopilot.write_warnings(asked, after))
+    found = (*autopilot.warnings(after), *autopilot.write_warnings(asked, current))
     return [f"{text[:1].upper()}{text[1:]}." for text in found]

@@ -1,24 +1,6 @@
 """Writing a compass calibration so that no half of it is ever in force. No I/O, no clock.
 
-Stages and what leaves them
----------------------------
-======== ======================================= ======= ========== ==================
-stage    sends, a window at a time               then    on silence another value
-======== ======================================= ======= ========== ==================
-COMPARE  a read of identity and all old values   OFF     over       over
-OFF      a write of 0 to the switches            WRITE   again      again
-WRITE    a write of each value still to confirm  VERIFY  again/OFF  again
-VERIFY   a read of all values, switches still 0  ON      roll back  SETTLE
-ON       one write of the target's switches      CONFIRM a read     VERIFY
-CONFIRM  a read of the switches                  OVER    roll back  SETTLE
-SETTLE   nothing until all sent before has come  IDENTIFY
-IDENTIFY a read of the identity                  OFF     roll back  over
-OVER     nothing
-======== ======================================= ======= ========== ==================
-
-Patience is bounded everywhere; where it ends, a vehicle not yet touched is left
-alone and any other is rolled back. The target is the new set; rolling back is
-the same road with the old set as target, entered at SETTLE.
+The stages and what leaves them: stages.py.
 
 Rules
 -----
@@ -54,7 +36,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from magcomp import autopilots
-from magcomp.mavlink.parameters import REAL32, ParamValue, fits
+from magcomp.mavlink.parameters import REAL32, ParamValue
 from magcomp.writing.events import (
     Event,
     Intends,
@@ -81,6 +63,7 @@ from magcomp.writing.messages import (
     ReadName,
     SetValue,
 )
+from magcomp.writing.patience import Waiting, ran_out
 from magcomp.writing.plan import WritePlan
 from magcomp.writing.stages import (
     CLOSED,
@@ -91,6 +74,7 @@ from magcomp.writing.stages import (
     WRITING,
     Target,
     expected,
+    misfit,
 )
 from magcomp.writing.watch import VehicleWatch
 
@@ -116,7 +100,7 @@ class WriteSequence:
     Attributes
     ----------
     stage
-        See the table at the top of the file.
+        See the table at the top of stages.py.
     outcome
         How it ended; None before.
     """
@@ -287,24 +271,10 @@ class WriteSequence:
     def _check_patience(self, now: float) -> None:
         if self.finished:
             return
-        silence, limit = self._timing.silence, self._timing.limit
-        silent = self._exchange.unanswered(now)
-        if self._watch.is_silent(now):
-            self._fail(Reason.LINK_LOST, f"nothing was heard for {silence:.0f} s", now)
-        elif self._watch.is_overdue(now):
-            self._fail(Reason.TIMEOUT, f"the write did not end within {limit:.0f} s", now)
-        elif (
-            self.stage in WRITING
-            and self._gate_closed(now)
-            and self._watch.is_without_heartbeat(now)
-        ):
-            self._fail(Reason.LINK_LOST, f"no heartbeat came for {silence:.0f} s", now)
-        elif self.stage in FENCED and self._fence.exhausted():
-            self._fail(Reason.TIMEOUT, "the vehicle answers no TIMESYNC any more", now)
-        elif silent:
-            verb = "confirmed" if self.stage in WRITING else "answered"
-            why = f"{silent[0]} was not {verb} in {self._timing.attempts} attempts"
-            self._fail(Reason.TIMEOUT, why, now)
+        gated = self._gate_closed(now)
+        waiting = Waiting(self.stage, self._watch, self._exchange, self._fence, gated)
+        if (reason := ran_out(waiting, self._timing, now)) is not None:
+            self._fail(*reason, now)
 
     def _enter(self, stage: Stage, now: float) -> None:
         target = Target(self._values, self._switches, self._unconfirmed)
@@ -355,11 +325,10 @@ class WriteSequence:
         self._enter(NEXT[self.stage], now)
 
     def _all_fit(self) -> bool:
-        for name, value in {**self._values, **self._switches}.items():
-            if not fits(value, self._types[name]):
-                self._end(Reason.REFUSED, f"{name} cannot hold {format_value(value)}")
-                return False
-        return True
+        why = misfit({**self._values, **self._switches}, self._types)
+        if why:
+            self._end(Reason.REFUSED, why)
+        return not why
 
     def _ask(self, now: float) -> list[Outgoing]:
         if self._gate_closed(now):

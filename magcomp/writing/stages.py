@@ -1,6 +1,24 @@
 """The stages of a write: their order, their kinds, and what each of them expects to hear.
 
-What they mean stands in the table at the top of protocol.py.
+Stages and what leaves them
+---------------------------
+======== ======================================= ======= ========== ==================
+stage    sends, a window at a time               then    on silence another value
+======== ======================================= ======= ========== ==================
+COMPARE  a read of identity and all old values   OFF     over       over
+OFF      a write of 0 to the switches            WRITE   again      again
+WRITE    a write of each value still to confirm  VERIFY  again/OFF  again
+VERIFY   a read of all values, switches still 0  ON      roll back  SETTLE
+ON       one write of the target's switches      CONFIRM a read     VERIFY
+CONFIRM  a read of the switches                  OVER    roll back  SETTLE
+SETTLE   nothing until all sent before has come  IDENTIFY
+IDENTIFY a read of the identity                  OFF     roll back  over
+OVER     nothing
+======== ======================================= ======= ========== ==================
+
+Patience is bounded everywhere; where it ends, a vehicle not yet touched is left
+alone and any other is rolled back. The target is the new set; rolling back is
+the same road with the old set as target, entered at SETTLE.
 """
 
 from __future__ import annotations
@@ -8,7 +26,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from magcomp.mavlink.parameters import fits
 from magcomp.writing.events import Stage
+from magcomp.writing.files import format_value
 from magcomp.writing.plan import WritePlan
 
 NEXT = {
@@ -67,3 +87,15 @@ def expected(stage: Stage, plan: WritePlan, target: Target) -> Mapping[str, floa
         Stage.CONFIRM: {**target.switches, **({} if on else target.values)},
     }
     return by_stage.get(stage, {})
+
+
+def misfit(values: Mapping[str, float], types: Mapping[str, int]) -> str:
+    """Which of the values its parameter's type cannot hold, as a sentence; empty where all fit."""
+    return next(
+        (
+            f"{name} cannot hold {format_value(value)}"
+            for name, value in values.items()
+            if not fits(value, types[name])
+        ),
+        "",
+    )

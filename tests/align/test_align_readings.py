@@ -110,6 +110,16 @@ def test_disarmed_time_is_left_out_where_there_is_enough_armed_time(recording):
     assert kept.time.max() < 50.0
 
 
+@pytest.mark.parametrize("pause_s", [4.0, 5.5, 6.5, 9.0])
+def test_a_short_pause_between_armed_stretches_is_kept(recording, pause_s):
+    time = np.array([0.0, 10.0, 25.0, 25.0 + pause_s, 55.0, 60.0])
+    armed = Series(time, np.array([0.0, 1.0, 0.0, 1.0, 0.0, 0.0]))
+    kept = readings(replace(recording, armed=armed), 1)
+    assert kept.time.min() >= 10.0
+    paused = (kept.time > 25.1) & (kept.time < 24.9 + pause_s)
+    assert paused.any() == (pause_s < 6.0)
+
+
 @pytest.mark.parametrize("armed_s", [0.0, 20.0])
 def test_disarmed_time_is_used_where_there_is_nothing_better(recording, armed_s):
     time = np.array([0.0, 10.0, 10.0 + armed_s, 60.0])

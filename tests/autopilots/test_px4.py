@@ -22,10 +22,12 @@ from magcomp.autopilots.px4_correction import (
     body_correction,
     correct,
     sensor_calibration,
+    stored,
     uncorrect,
 )
 from magcomp.autopilots.px4_names import vector_names
 from magcomp.autopilots.px4_rotation import ROTATIONS, sensor_to_body
+from magcomp.autopilots.px4_taking_over import unsettled
 from magcomp.errors import MissingDataError, ParameterFileError
 from magcomp.model import (
     CURRENT,
@@ -40,6 +42,10 @@ from magcomp.model import (
     Vehicle,
     symmetric,
 )
+from magcomp.simulate import scenario
+from magcomp.simulate.px4.compasses import Compasses
+from magcomp.simulate.px4.parameters import Parameters, initial_values
+from magcomp.simulate.px4.sensors import DEVICE_IDS
 
 PX4 = Px4()
 
@@ -402,9 +408,49 @@ def test_whole_numbers_are_written_as_such():
     assert all(autopilots.integer_type(n) is None for n in ("CAL_MAG0_XCOMP", "CAL_MAG0_YAW"))
 
 
-def test_a_write_is_followed_by_a_restart():
-    (warning,) = PX4.write_warnings({"CAL_MAG0_XCOMP": 1.0}, {"CAL_MAG_COMP_TYP": 2.0})
-    assert "restart the vehicle" in warning
+def test_a_write_says_whether_a_restart_is_needed():
+    by_current = {**held(1), "CAL_MAG_COMP_TYP": 2.0}
+    assert PX4.write_warnings({"CAL_MAG0_XCOMP": 1.0}, by_current) == ()
+    assert PX4.write_warnings({"CAL_MAG0_XOFF": 0.06}, by_current) == ()
+    halves = {"CAL_MAG0_XOFF": 0.06, "CAL_MAG0_YOFF": -0.083}
+    (warning,) = PX4.write_warnings(halves, by_current)
+    assert "restart the vehicle after writing" in warning
+    assert "CAL_MAG0_OFF" in warning
+
+
+def test_a_write_says_what_will_never_be_in_force():
+    small = {f"CAL_MAG0_{axis}OFF": 0.002 for axis in "XYZ"}
+    (warning,) = PX4.write_warnings(small, {**held(1), "CAL_MAG_COMP_TYP": 2.0})
+    assert "CAL_MAG0_OFF is never in force" in warning
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_what_is_not_told_of_comes_into_force_in_whatever_order_it_is_written(seed):
+    """On a simulated PX4, which looks at its parameters in the midst of it."""
+    luck = np.random.default_rng(seed)
+    truth = scenario("parked", 1).truth
+    parameters = Parameters(initial_values(truth))
+    compasses = Compasses(truth, np.zeros(3), parameters, luck)
+    before, now = dict(parameters.values), 10.0
+    asked = {}
+    for kind, span in (("OFF", 0.008), ("SCALE", 0.015), ("ODIAG", 0.015)):
+        for axis in luck.permutation(list("XYZ"))[: luck.integers(4)]:
+            name = f"CAL_MAG0_{axis}{kind}"
+            asked[name] = float(np.float32(before[name] + luck.uniform(-span, span)))
+    doubtful = dict(unsettled(asked, before, 1))
+    for name in luck.permutation(list(asked)):
+        parameters.set(name, asked[name], now)
+        now += luck.uniform(0.0, 1.2)
+        compasses.look(now, armed=False)
+    compasses.look(now + 2.0, armed=False)
+    for restarted in (False, True):
+        if restarted:
+            compasses.restart()
+        force, wanted = compasses.in_force(DEVICE_IDS[0]), stored(parameters.values, 1)
+        for kind, attribute in (("OFF", "offset"), ("SCALE", "scale"), ("ODIAG", "off_diagonal")):
+            same = np.array_equal(getattr(force, attribute), getattr(wanted, attribute))
+            told = doubtful.get(f"CAL_MAG0_{kind}")
+            assert same or told == "never" or (told == "late" and not restarted)
 
 
 def test_many_changes_take_no_longer_than_one_look_at_each():

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import re
 from html.parser import HTMLParser
+from pathlib import Path
 from urllib.parse import quote
 
 import numpy as np
+import pytest
+from browser_checks import axe_findings, show
+from chromium import chromium_page, find_chromium
 from made_flights import MOTOR, fleet, log_of, row
 
 from magcomp.fleet.as_html import MOST_FLIGHTS, html
@@ -68,6 +72,21 @@ def test_many_flights_are_shown_as_the_newest() -> None:
     assert page.count("flight000") == MOST_FLIGHTS
     assert page.count("<circle") >= 60
     assert "60 flights together" in page
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(find_chromium() is None, reason="no Chromium on this machine")
+def test_it_stands_up_in_a_browser(tmp_path: Path) -> None:
+    path = tmp_path / "fleet.html"
+    rows = [row(k, uid=f"uid{k % 3}", before_deg=float(k), verdict="good") for k in range(12)]
+    bad = without_fit(log_of(row(20)), "f" * 64, "it holds no compass")
+    path.write_text(html(fleet([*rows, *bad]), {}), encoding="utf-8")
+    with chromium_page(tmp_path / "profile") as browser:
+        for width in (1280, 390):
+            show(browser, path, width, until="document.readyState === 'complete'")
+            assert browser.complaints() == []
+            assert browser.evaluate("document.documentElement.scrollWidth") <= width
+            assert axe_findings(browser) == []
 
 
 def test_an_empty_fleet_is_a_page() -> None:

@@ -11,6 +11,7 @@ from report_analyses import flown, refused, still
 
 from magcomp.model import Grade
 from magcomp.report import as_text, words
+from magcomp.report.advice import steps
 from magcomp.report.look import Look
 from magcomp.report.plain import pilots_lines, table_rows
 from magcomp.report.roles import roles
@@ -115,6 +116,27 @@ class TestText:
         text = text_of(flown, verbose=True)
         assert text.count("forward") == 2
         assert not re.search(r"^ +x +y +z", text, re.MULTILINE)
+
+
+class TestFirstStep:
+    def test_it_is_about_the_compass_the_vehicle_flies_on(self) -> None:
+        assert steps(still().document)[0] == "Your vehicle flies on compass 1: write its numbers."
+        assert steps(still().document)[1].startswith("Disarm, then write")
+
+    def test_a_rejected_compass_is_still_the_first_to_be_spoken_of(self) -> None:
+        first = steps(changed(still().document, 1, verdict="rejected"))[0]
+        assert first.startswith("Your vehicle flies on compass 1: switch it off and fly on")
+
+    def test_the_first_that_is_used_is_flown_on(self) -> None:
+        document = copy.deepcopy(still().document)
+        document["vehicle"]["compasses"][0]["used"] = False
+        assert steps(document)[0].startswith("Your vehicle flies on compass 2: ")
+
+    def test_a_log_that_does_not_tell_which_is_used_begins_with_what_to_write(self) -> None:
+        document = copy.deepcopy(still().document)
+        for compass in document["vehicle"]["compasses"]:
+            compass["used"] = None
+        assert steps(document)[0].startswith("Disarm, then write")
 
 
 class TestRoles:

@@ -7,20 +7,20 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
+from browser_checks import DRAWN, assert_clean, axe_findings, clipped_labels, prefer, show
 from chromium import Page, chromium_page, find_chromium
 from report_analyses import refused, still
 
 from magcomp.analysis import Options, analyse
+from magcomp.report import words
 from magcomp.report.as_html import html
 
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(find_chromium() is None, reason="no Chromium on this machine"),
 ]
-
-LOCAL = ("file:", "data:", "blob:")
-DRAWN = "document.documentElement?.dataset.drawn"
 
 
 @pytest.fixture(scope="module")
@@ -44,36 +44,6 @@ def bad(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("bad") / "report.html"
     path.write_text(html(made.recording, made.analysis, options=made.options), encoding="utf-8")
     return path
-
-
-def prefer(browser: Page, scheme: str) -> None:
-    features = [{"name": "prefers-color-scheme", "value": scheme}]
-    browser.call("Emulation.setEmulatedMedia", features=features)
-
-
-def show(browser: Page, path: Path, width: int = 1280) -> None:
-    browser.call(
-        "Emulation.setDeviceMetricsOverride",
-        width=width,
-        height=900,
-        deviceScaleFactor=1,
-        mobile=width < 500,
-    )
-    browser.call("Emulation.setTouchEmulationEnabled", enabled=width < 500)
-    prefer(browser, "light")
-    browser.open(path)
-    browser.wait_for(DRAWN)
-
-
-def assert_clean(browser: Page, path: Path) -> None:
-    """Every picture is drawn; nothing complained; nothing was asked for from elsewhere."""
-    canvases = browser.evaluate("document.querySelectorAll('.canvas').length")
-    assert canvases > 0
-    assert browser.evaluate(f"Number({DRAWN})") == canvases
-    assert browser.complaints() == []
-    requests = browser.requests()
-    assert path.resolve().as_uri() in requests
-    assert [url for url in requests if not url.startswith(LOCAL)] == []
 
 
 @pytest.fixture(scope="module")
@@ -111,6 +81,70 @@ def test_it_prints_and_is_itself_again_afterwards(shown: Page, good: Path) -> No
     assert_clean(shown, good)
 
 
+MOVE = """(block, value, mode) => {
+  const find = (what) => document.querySelector(`${block} ${what}`);
+  const slider = find("input[type=range]");
+  slider.value = value;
+  slider.dispatchEvent(new Event("input", { bubbles: true }));
+  find(`input[value=${mode}]`).click();
+  return find(".said").textContent;
+}"""
+
+
+def move(page: Page, value: float, mode: str) -> str:
+    """Move the slider and the switch of compass 1; what the page then says."""
+    said: str = page.evaluate(f"({MOVE})('#compass-1', {value}, '{mode}')")
+    return said
+
+
+# A picture is drawn anew in the frame after the one in which its slider moved.
+TWO_FRAMES = "new Promise((go) => requestAnimationFrame(() => requestAnimationFrame(() => go(0))))"
+
+MIDDLE = """(name) => {
+  const trace = document.getElementById("cloud-1").data.find((each) => each.name === name);
+  return [trace.x, trace.y, trace.z].map((every) => {
+    const known = every.filter((value) => value !== null);
+    return known.reduce((sum, value) => sum + value, 0) / known.length;
+  });
+}"""
+
+
+def middle(page: Page, trace: str = "readings") -> list[float]:
+    """Mean position of a trace of the field in space."""
+    found: list[float] = page.evaluate(f"({MIDDLE})('{trace}')")
+    return found
+
+
+def test_the_slider_moves_cloud_centre_and_needle(shown: Page) -> None:
+    compass = still().document["compasses"][0]
+    centre = still().analysis.compasses[0].fit.correction.centre
+    hand = "document.querySelector('#compass-1 .hand').getAttribute('transform')"
+    turn = {}
+    place = {}
+    for value in (20, 80):
+        move(shown, value, "raw")
+        shown.wait_for(f"document.querySelector('#compass-1 output').textContent === '{value} %'")
+        shown.evaluate(TWO_FRAMES)
+        place[value] = np.array([middle(shown), middle(shown, "centre")])
+        turn[value] = float(re.findall(r"[\d.]+", shown.evaluate(hand))[0])
+    for moved in place[80] - place[20]:
+        assert moved == pytest.approx(centre(0.8) - centre(0.2), abs=0.2)
+    for row in compass["heading_error_deg"]:
+        if round(100 * row["u"]) in turn:
+            assert turn[round(100 * row["u"])] == pytest.approx(max(row["before"], row["p95"]))
+
+
+def test_corrected_readings_stand_still_and_the_needle_is_within_the_bound(shown: Page) -> None:
+    compass = still().document["compasses"][0]
+    rows = {round(100 * row["u"]): row for row in compass["heading_error_deg"]}
+    for value in (20, 80):
+        said = move(shown, value, "corrected")
+        assert f"at most {words.degrees(rows[value]['p95'])} wrong" in said
+        shown.evaluate(TWO_FRAMES)
+        assert np.abs(middle(shown, "centre")).max() < 0.5
+    move(shown, 50, "measured")
+
+
 def test_three_compasses_print_on_five_pages(browser: Page, tmp_path: Path) -> None:
     made = still()
     path = tmp_path / "three.html"
@@ -125,6 +159,25 @@ def test_a_phone_shows_a_rejected_fit_without_scrolling_sideways(browser: Page, 
     show(browser, bad, width=390)
     assert_clean(browser, bad)
     assert browser.evaluate("document.documentElement.scrollWidth") <= 390
+
+
+@pytest.mark.parametrize(("which", "width"), [("good", 1280), ("bad", 390)])
+def test_axe_finds_nothing(
+    browser: Page, which: str, width: int, request: pytest.FixtureRequest
+) -> None:
+    show(browser, request.getfixturevalue(which), width)
+    for scheme in ("light", "dark"):
+        prefer(browser, scheme)
+        assert axe_findings(browser) == []
+
+
+@pytest.mark.parametrize("which", ["good", "bad"])
+@pytest.mark.parametrize("width", [390, 1280])
+def test_no_label_is_cut(
+    browser: Page, which: str, width: int, request: pytest.FixtureRequest
+) -> None:
+    show(browser, request.getfixturevalue(which), width)
+    assert clipped_labels(browser) == []
 
 
 def test_the_check_would_notice_an_error_and_a_request(browser: Page, tmp_path: Path) -> None:

@@ -68,3 +68,12 @@ def test_a_recording_without_the_control_quantity_is_refused() -> None:
     other = replace(made.recording, current=None, outputs=None)
     with pytest.raises(MissingDataError, match="must hold the current"):
         compass_plots(other, made.analysis.compasses[0])
+
+
+def test_the_level_errors_in_force_are_within_those_of_all_attitudes() -> None:
+    made = flown()
+    result = made.analysis.compasses[0]
+    plots = compass_plots(made.recording, result)
+    quoted = made.document["compasses"][0]["quoted"]
+    largest = float(np.degrees(np.abs(plots.level_errors).max()))
+    assert 0.3 * quoted["before"] < largest <= quoted["before"]

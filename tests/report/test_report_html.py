@@ -25,7 +25,7 @@ from magcomp.sources import read
 from magcomp.writing.files import parse_parameters
 
 CASES = [still, flown, refused]
-MOST_BYTES = 6_000_000
+MOST_BYTES = 5_000_000
 EXTERNAL = re.compile(r"^(https?:)?//", re.IGNORECASE)
 
 
@@ -171,10 +171,10 @@ class TestPictures:
 
 class TestSelfContained:
     @pytest.mark.parametrize("make", CASES)
-    def test_it_is_smaller_than_six_megabytes(self, make) -> None:
+    def test_it_is_smaller_than_five_megabytes(self, make) -> None:
         assert len(page_of(make).encode()) < MOST_BYTES
 
-    def test_three_compasses_turned_at_five_levels_stay_below_six_megabytes(self) -> None:
+    def test_three_compasses_turned_at_five_levels_stay_below_five_megabytes(self) -> None:
         made = case("turntable_five_levels")
         assert len(made.analysis.compasses) == 3
         assert len(html(made.recording, made.analysis).encode()) < MOST_BYTES

@@ -14,6 +14,7 @@ from typing import Any
 import made
 
 from magcomp.errors import LinkError
+from magcomp.live.situation import Manoeuvre
 from magcomp.live.snapshot import LiveSnapshot
 from magcomp.model import ParameterSet, Recording
 from magcomp.tui import MagcompApp
@@ -64,6 +65,7 @@ class ScriptedSession:
     refuses: str = ""
     trouble: Exception | None = None
     closed: bool = False
+    manoeuvre: Manoeuvre | None = None
     slow: bool = False
     writing: threading.Event = field(default_factory=threading.Event)
     never: threading.Event = field(default_factory=threading.Event)

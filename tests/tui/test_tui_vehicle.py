@@ -15,7 +15,7 @@ from truth import FIXTURES
 from magcomp.analysis import check
 from magcomp.errors import LinkError, LinkTimeoutError, VehicleRefusedError, WriteError
 from magcomp.live.guide import Guidance
-from magcomp.live.situation import Situation
+from magcomp.live.situation import Manoeuvre, Situation
 from magcomp.model import Grade, ParameterChange, ParameterHistory
 from magcomp.sources import read
 from magcomp.tui import opening, writing
@@ -249,6 +249,21 @@ async def test_a_snapshot_that_fails_is_told_once_and_the_app_goes_on(tmp_path):
         assert "Udp:1:2 is gone." in screen(app)
         await press(pilot, "enter")
         assert app.is_running
+
+
+async def test_how_the_vehicle_is_moved_can_be_said_by_a_key(tmp_path):
+    session = ScriptedSession()
+    async with scripted.app(tmp_path, session=session).run_test() as pilot:
+        await connected(pilot)
+        await press(pilot, "n")
+        await until(pilot, lambda: "Throttle levels" in screen(pilot.app))
+        for way, said in zip(Manoeuvre, ("on a stand", "flown", "tied down"), strict=True):
+            await press(pilot, "m")
+            assert session.manoeuvre is way
+            await until(pilot, lambda said=said: said in screen(pilot.app))
+        await press(pilot, "m")
+        assert session.manoeuvre is None
+        await until(pilot, lambda: "Taken as" not in screen(pilot.app))
 
 
 async def test_when_it_is_enough_the_next_step_is_named(tmp_path):

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
+
 import pytest
 from fake_autopilot import FakeLink, Network, VirtualClock
-from fake_px4 import NEW, OLD, SWITCH, FakePx4
+from fake_px4 import NEW, OLD, QUAD, SWITCH, FakePx4
 from px4_faults import FAULTS, clean_messages, is_so, strike, upload
+
+from magcomp.model import ParameterSet
 
 
 def test_the_switch_goes_off_first_and_on_last_and_integers_travel_as_bytes(tmp_path):
@@ -14,6 +18,17 @@ def test_the_switch_goes_off_first_and_on_last_and_integers_travel_as_bytes(tmp_
     assert vehicle.calibration() == NEW
     assert vehicle.writes[0] == (SWITCH, 0.0)
     assert vehicle.writes[-1] == (SWITCH, 1.0)
+
+
+def test_compensation_is_written_before_offsets_and_each_vector_together(tmp_path):
+    """Whatever the order in the file."""
+    vehicle, clock = FakePx4(OLD), VirtualClock()
+    mixed = ParameterSet(dict(sorted(NEW.items(), key=lambda item: item[0][::-1])), QUAD)
+    assert upload(FakeLink(vehicle, clock), tmp_path / "b.param", mixed).good
+    kinds = [name[10:] for name, _ in vehicle.writes if name != SWITCH]
+    assert [kind for kind, _ in itertools.groupby(kinds)] == ["COMP", "OFF", "SCALE", "ODIAG"]
+    slots = [name[7] for name, _ in vehicle.writes if name.endswith("COMP")]
+    assert slots == sorted(slots)
 
 
 def test_what_was_confirmed_is_still_there_after_a_power_cut(tmp_path):

@@ -12,7 +12,7 @@ from textual.widget import Widget
 from textual.widgets import Static
 
 from magcomp.buffer import LEVELS
-from magcomp.live.situation import Situation
+from magcomp.live.situation import Manoeuvre, Situation
 from magcomp.live.snapshot import LiveSnapshot
 from magcomp.report import words
 from magcomp.tui.screens.step import StepScreen
@@ -20,6 +20,12 @@ from magcomp.tui.widgets.coverage_map import CoverageMap, LevelTable
 from magcomp.tui.widgets.heading_ring import WANTED, HeadingRing
 from magcomp.tui.widgets.live_facts import LiveFacts, bound_words
 from magcomp.tui.widgets.live_table import ControlBars, LiveTable
+
+_SAID = {
+    Manoeuvre.FLIGHT: "Taken as flown.",
+    Manoeuvre.STAND: "Taken as held on a stand.",
+    Manoeuvre.SWEEP: "Taken as tied down.",
+}
 
 _FEW = 2
 _MANY = 6
@@ -33,9 +39,13 @@ class RecordScreen(StepScreen):
 **Recording.** Everything the vehicle says is written to the file as it arrives. Do what the *next*
 line says; it speaks of throttle only while the vehicle is held or tied down. When it says that it
 is enough, press N. You can fit at any time and come back: the recording goes on.
+
+Whether the vehicle is flown, turned on a stand or tied down is found out. Where that goes wrong,
+press M to say it, once or more, until the *next* line names it.
 """
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("n", "app.forward", "Fit", id="go.next"),
+        Binding("m", "app.manoeuvre", "How", id="record.manoeuvre"),
         Binding("b", "app.backward", "Back", id="go.back"),
         Binding("x", "app.disconnect", "Disconnect", id="connect.close"),
     ]
@@ -90,7 +100,7 @@ is enough, press N. You can fit at any time and come back: the recording goes on
         level_table.show(live.coverage, live.level_seconds, live.levels_done, now)
         self.query_one(LiveFacts).show(live)
         self._show_mind(live)
-        self.say(busy.sentence if busy is not None else next_sentence(live))
+        self.say(busy.sentence if busy is not None else next_sentence(live, self.state.manoeuvre))
 
     def _show_mind(self, live: LiveSnapshot) -> None:
         room = _MANY if self.has_class("-tall") else _FEW
@@ -109,10 +119,11 @@ def _compasses_title(live: LiveSnapshot) -> str:
     return ": ".join(filter(None, (title, bound_words(live))))
 
 
-def next_sentence(live: LiveSnapshot) -> str:
-    """What to do next; a lost link comes before everything."""
+def next_sentence(live: LiveSnapshot, manoeuvre: Manoeuvre | None = None) -> str:
+    """What to do next, and what the user said it rests on; a lost link comes before everything."""
     if not live.connected:
         return "The link is lost: stay here, it goes on when the link is back."
+    said = "" if manoeuvre is None else f"{_SAID[manoeuvre]} "
     if live.guidance.enough:
-        return f"{words.sentence(live.guidance.text)} Then press N."
-    return words.sentence(live.guidance.text)
+        return f"{said}{words.sentence(live.guidance.text)} Then press N."
+    return f"{said}{words.sentence(live.guidance.text)}"

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
 from textual.content import Content
 
-from magcomp.model import Recording
 from magcomp.tui.widgets.drawn import Drawn
 
 _EIGHTHS = " ▁▂▃▄▅▆▇█"
-_MOST_POINTS = 512
 
 
 @dataclass(frozen=True)
@@ -32,18 +29,6 @@ class Strip:
     duration_s: float
     start_s: float
     end_s: float
-
-
-def loads(recording: Recording) -> tuple[float, ...]:
-    """Largest load in each of many equal parts of a recording; empty where none is known."""
-    known = (s for s in (recording.current, recording.throttle) if s is not None and len(s))
-    series = next(known, None)
-    if series is None or recording.duration_s <= 0.0:
-        return ()
-    part = np.clip((series.time / recording.duration_s * _MOST_POINTS).astype(int), 0, None)
-    most = np.zeros(_MOST_POINTS)
-    np.maximum.at(most, np.minimum(part, _MOST_POINTS - 1), np.nan_to_num(series.value))
-    return tuple((most / max(float(most.max()), 1e-9)).round(3).tolist())
 
 
 class FlightStrip(Drawn[Strip]):

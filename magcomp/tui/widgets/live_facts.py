@@ -12,7 +12,7 @@ from magcomp.report import words
 from magcomp.tui.widgets.bars import bar
 from magcomp.tui.widgets.drawn import Drawn
 
-_FIELD_MESSAGES = ("RAW_IMU", "SCALED_IMU2", "SCALED_IMU3")
+_FIELD_MESSAGES = ("RAW_IMU", "SCALED_IMU", "SCALED_IMU2", "SCALED_IMU3")
 _SPARKS = "▁▂▃▄▅▆▇█"
 _SPARK_CELLS = 12
 _LOOK_BACK = 3
