@@ -53,7 +53,7 @@ def level_matrix(roll: ArrayLike, pitch: ArrayLike) -> FloatArray:
         [
             np.stack([cos_pitch, sin_roll * sin_pitch, cos_roll * sin_pitch], axis=-1),
             np.stack([zero, cos_roll, -sin_roll], axis=-1),
-            np.stack([-sin_pitch, sin_roll * cos_pitch, cos_roll * cos_pitch], axis=-1),
+            gravity_direction(roll, pitch),
         ],
         axis=-2,
     )
@@ -67,7 +67,9 @@ def gravity_direction(roll: ArrayLike, pitch: ArrayLike) -> FloatArray:
     >>> gravity_direction(0.0, np.radians(30.0)).round(3).tolist()
     [-0.5, 0.0, 0.866]
     """
-    return level_matrix(roll, pitch)[..., 2, :]
+    roll, pitch = np.broadcast_arrays(np.asarray(roll, float), np.asarray(pitch, float))
+    cos_pitch = np.cos(pitch)
+    return np.stack([-np.sin(pitch), np.sin(roll) * cos_pitch, np.cos(roll) * cos_pitch], axis=-1)
 
 
 def body_from_earth(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> FloatArray:

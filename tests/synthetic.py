@@ -206,3 +206,18 @@ class Turned(Flown):
         roll = 1.3 * np.sin(2 * np.pi * time / 23.0)
         pitch = 0.9 * np.sin(2 * np.pi * time / 17.0)
         return np.stack([roll, pitch, 2 * np.pi * time / 31.0], axis=1)
+
+
+def with_both(motors_follow: str, seed: int) -> Recording:
+    """Current and throttle that wander apart (a battery that sags); the field follows one."""
+    flown = Flown(seed=seed)
+    plain = flown.recording()
+    time = plain.current.time
+    rng = np.random.default_rng([seed, 30])
+    apart = 1.0 + 0.15 * waves(rng, time, 30.0, 6.0)
+    follows = plain.current.value
+    other = np.maximum(follows * apart, 0.0)
+    current, percent = (follows, other) if motors_follow == "current" else (other, follows)
+    return replace(
+        plain, current=Series(time, current), throttle=Series(time, np.clip(percent / 60.0, 0, 1))
+    )

@@ -13,22 +13,18 @@ from magcomp.align import (
     currents_of_motors,
     expected_earth,
     readings,
+    reported,
     thinned,
     to_undo,
 )
 from magcomp.align.health import compass_complaints, current_complaints, vehicle_complaints
 from magcomp.analysis.choose import with_speed_controllers
+from magcomp.analysis.compare import Judged, beaten, better
 from magcomp.analysis.emit import Emission, emit
-from magcomp.analysis.judged import (
-    Judged,
-    chosen_of,
-    compare,
-    forms_notes,
-    lacking_notes,
-    notes_of,
-)
+from magcomp.analysis.forms import compared, forms_notes
 from magcomp.analysis.motor_by_motor import Answer, as_written
 from magcomp.analysis.multiplied import kinds_to_try, why_only_to_look_at
+from magcomp.analysis.notes import lacking_notes, notes_of
 from magcomp.analysis.origin import hints
 from magcomp.analysis.vehicle_words import in_words_of
 from magcomp.earth import EarthField
@@ -51,7 +47,6 @@ from magcomp.model import (
     CompassResult,
     Control,
     Form,
-    Grade,
     Recording,
     Verdict,
     pack,
@@ -140,8 +135,12 @@ def analyse(
     steps = len(kinds) * len(compasses)
     judged: dict[str, list[Judged]] = {}
     lacking: dict[int, MissingDataError] = {}
+    plain: dict[str, tuple[float, ...]] = {}
     for kind in kinds:
         forms = [control for control in (*found, *motors) if control.kind == kind]
+        if kind == THROTTLE and CURRENT in judged and (left := beaten(judged[CURRENT], forms)):
+            plain[kind] = left
+            continue
         for compass in compasses:
             progress(f"compass {compass} by {kind}", sum(map(len, judged.values())) / steps)
             try:
@@ -154,11 +153,12 @@ def analyse(
     if not judged:
         raise _with_cure(recording, compasses[0], lacking[compasses[0]])
     progress("done", 1.0)
-    chosen = MOTORS if MOTORS in judged else chosen_of(judged)
+    chosen = MOTORS if MOTORS in judged else better(judged)
     answers = [as_written(recording, each) for each in judged[chosen]]
     emitted = emit(recording, [each.written for each in answers])
-    nothing = all(each.judged.verdict.grade is Grade.REJECTED for each in answers)
-    compared = compare(judged, motors)
+    nothing = all(each.judged.is_rejected for each in answers)
+    forms_of = compared(judged, motors, reported(found).get(THROTTLE))
+    held_out = {k: tuple(j.held_out for j in results) for k, results in judged.items()} | plain
     why_not = why_only_to_look_at(recording, chosen)
     return Analysis(
         source=recording.source,
@@ -167,15 +167,15 @@ def analyse(
         compasses=tuple(
             _result(
                 each,
-                Emission({}, {}) if why_not else emitted[each.judged.fit.compass],
-                compared.get(each.judged.fit.compass, ()),
+                Emission({}, {}) if why_not else emitted[each.written.compass],
+                forms_of.get(each.written.compass, ()),
                 nothing_accepted=nothing,
             )
             for each in answers
         ),
         notes=(
-            *notes_of(recording, wanted.compass, judged, chosen),
-            *forms_notes(compared, judged, chosen),
+            *notes_of(recording, wanted.compass, held_out, chosen),
+            *forms_notes(forms_of, judged, chosen),
             *lacking_notes(lacking, judged),
             *hints([each.judged.fit for each in answers]),
         ),
@@ -188,13 +188,12 @@ def _result(
 ) -> CompassResult:
     judged = answer.judged
     accepted = answer.parameters or emitted.accepted
-    rejected = judged.verdict.grade is Grade.REJECTED
     left_out = {} if nothing_accepted else emitted.left_out
     return CompassResult(
         fit=judged.fit,
         verdict=judged.verdict,
         in_force=judged.problem.readings.in_force[-1].correction,
-        parameters=left_out if rejected else accepted,
+        parameters=left_out if judged.is_rejected else accepted,
         insisted=accepted,
         left_out=emitted.left_out,
         forms=forms,

@@ -9,7 +9,7 @@ import numpy as np
 
 from magcomp import autopilots
 from magcomp.align import drive_of_motors, interpolate
-from magcomp.analysis.judged import Judged
+from magcomp.analysis.compare import Judged
 from magcomp.autopilots.terms import MotorLaw
 from magcomp.fit.nearest import moved, nearest
 from magcomp.judge.evidence import used_lags

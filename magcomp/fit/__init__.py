@@ -1,6 +1,14 @@
 """Samples → MotorFit: three ways the same number is found."""
 
-from magcomp.fit.auto import LEAST_READINGS, METHODS, best_form, fit, refit, require_readings
+from magcomp.fit.auto import (
+    LEAST_READINGS,
+    METHODS,
+    best_form,
+    fit,
+    fit_alike,
+    refit,
+    require_readings,
+)
 from magcomp.fit.ellipsoid import Ellipsoids, fit_ellipsoid, fit_ellipsoids
 from magcomp.fit.flight import Problem
 from magcomp.fit.folds import folds
@@ -19,6 +27,7 @@ __all__ = [
     "centres_of_flight",
     "departures",
     "fit",
+    "fit_alike",
     "fit_ellipsoid",
     "fit_ellipsoids",
     "folds",

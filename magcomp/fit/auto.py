@@ -11,8 +11,10 @@ from magcomp.errors import FitRejectedError, MissingDataError, UsageError
 from magcomp.fit.field_model import (
     FIELD_LAG,
     REGRESSOR_LAG,
+    SIZE,
     STRENGTH,
     correction_at,
+    errors_of,
     indices_of_correction,
     lags_of,
     parameters_of,
@@ -36,6 +38,7 @@ from magcomp.fit.residual import residuals, spread
 from magcomp.fit.robust import Estimate
 from magcomp.fit.sweep import fit_sweep, is_still
 from magcomp.model import (
+    MOTOR,
     OFFSET,
     BoolArray,
     FloatArray,
@@ -61,6 +64,9 @@ SHARP_OFFSET = 0.05
 
 LEAST_SOFT_IRON, MOST_SOFT_IRON = 0.6, 1.6
 """Soft iron of a compass that can be used at all has its eigenvalues between these."""
+
+CERTAIN_MGAUSS = 0.5
+"""A tenth of a degree of heading: which of two centres is known better does not matter below."""
 
 LEAST_READINGS = 60
 _MOST_FREE = len(GROUPS)
@@ -100,11 +106,18 @@ def fit(problem: Problem, method: str = "auto") -> MotorFit:
         )
     if method in ("auto", "sweep") and still:
         return fit_sweep(problem)
-    if method in ("auto", "levels"):
+    by_one = problem.control.parts == 1
+    if method == "levels" and not by_one:
+        raise FitRejectedError(
+            "The method of levels needs one current or throttle; instead received the current of "
+            "each motor, which steady levels do not tell apart: use the method flight"
+        )
+    if method in ("auto", "levels") and by_one:
         rows, level = usable_levels(problem)
         count = len(np.unique(level))
         if count >= 2 and (method == "levels" or len(rows) > 0.4 * len(samples)):
-            return _with_lags(problem, fit_levels(problem, rows, level)[0])
+            found = _with_lags(problem, fit_levels(problem, rows, level)[0])
+            return found if method == "levels" else _surer(found, fit_flight(problem))
         if method == "levels":
             raise FitRejectedError(
                 "The method of levels needs turns about all axes at two or more steady levels of "
@@ -147,8 +160,28 @@ def refit(problem: Problem, fit: MotorFit, keep: BoolArray) -> MotorFit:
             return fit
         again = fit_levels(part, rows, level)[0]
         return replace(again, lags=fit.lags, lags_std=fit.lags_std, vertical=fit.vertical)
-    found = near(part, _groups(fit), parameters_of(fit, fit.lags))
-    return _updated(fit, found)
+    return _updated(fit, near(part, _groups(fit), parameters_of(fit, fit.lags)))
+
+
+def _surer(by_levels: MotorFit, by_flight: MotorFit) -> MotorFit:
+    """Of two fits the one whose centre is better known where it is known least.
+
+    Turns that hardly cover each level leave its ellipsoid's centre free; gravity then tells more.
+    """
+    if _doubt_of_centre(by_levels) <= max(_doubt_of_centre(by_flight), CERTAIN_MGAUSS):
+        return by_levels
+    why = "gravity tells more of this log than the turns at steady levels alone"
+    return replace(by_flight, why=f"{why}; {by_flight.why}")
+
+
+def _doubt_of_centre(fit: MotorFit) -> float:
+    """Standard error of the field's shift, mGauss, at rest or at the top, whichever is larger."""
+    of_parameters = fit.covariance[: OFFSET.stop, : OFFSET.stop]
+    doubts = []
+    for u in (0.0, fit.u_high):
+        shift = np.hstack([u * np.eye(3), fit.correction.soft_iron])
+        doubts.append(float(np.sqrt(np.trace(shift @ of_parameters @ shift.T))))
+    return max(doubts)
 
 
 def _with_lags(problem: Problem, fit: MotorFit) -> MotorFit:
@@ -165,18 +198,50 @@ def fit_flight(problem: Problem) -> MotorFit:
     told_apart = tell @ found.covariance @ tell.T
     if len(told_apart):
         found = alike_where_unseen(found, blur(problem.control.series.value))
+    bare = replace(_of_flight(problem, found, free), told_apart=told_apart)
+    samples = problem.sample(bare.lags)
+    centres = centres_of_flight(
+        samples, bare.correction, (bare.strength, bare.vertical), bare.noise
+    )
+    return with_line(bare, centres)
+
+
+def fit_alike(problem: Problem, fit: MotorFit) -> MotorFit:
+    """A flight against another control quantity with the freedom of a fit that exists.
+
+    To be compared with that fit on held-out readings, at a tenth of the price of a fit of its own:
+    it has no covariance and no centres.
+
+    Parameters
+    ----------
+    problem
+        The other control quantity, and the readings of the fit.
+    fit
+        Of a flight.
+    """
+    free = _groups(fit)
+    begin = parameters_of(fit, fit.lags)
+    begin[MOTOR] = begin[SIZE:] = 0.0
+    found = estimate(problem, free, start=begin, with_covariance=False)
+    errors = errors_of(problem.sample(lags_of(found.parameters)), found.parameters)
+    found = estimate(
+        problem, free, start=found.parameters, errors=errors, with_covariance=False, rounds=_QUICK
+    )
+    return _of_flight(problem, found, free)
+
+
+def _of_flight(problem: Problem, found: FlightEstimate, free: int) -> MotorFit:
     lags = lags_of(found.parameters)
     samples = problem.sample(lags)
     std = np.sqrt(np.diag(found.covariance))
-    correction = correction_of(found)
     among = indices_of_correction(len(found.parameters))
-    bare = MotorFit(
+    return MotorFit(
         compass=samples.compass,
         method="flight",
         why=_why(free),
         regressor=problem.control.kind,
         origin=problem.control.origin,
-        correction=correction,
+        correction=correction_of(found),
         covariance=found.covariance[np.ix_(among, among)],
         free=frozenset(GROUPS[:free]),
         lags=lags,
@@ -190,10 +255,7 @@ def fit_flight(problem: Problem) -> MotorFit:
         u_high=float(np.quantile(samples.total, 0.98)),
         count=len(samples),
         numbers=problem.control.numbers,
-        told_apart=told_apart,
     )
-    centres = centres_of_flight(samples, correction, (bare.strength, bare.vertical), bare.noise)
-    return with_line(bare, centres)
 
 
 def _choose_freedom(problem: Problem) -> tuple[FlightEstimate, int]:

@@ -165,18 +165,20 @@ def marginal(part: Reduced, wander: Wander) -> tuple[FloatArray, float]:
         −½ log det of what the states' precision gained: what the likelihood loses to them.
     """
     # SciPy takes a second to import: only where there is something to fit.
-    from scipy.linalg import cho_solve_banded, cholesky_banded  # noqa: PLC0415
+    from scipy.linalg.lapack import dpbtrf, dtbtrs  # noqa: PLC0415
 
     band, prior_log_det = _prior_band(part.time, wander)
     size = len(part.time) * STATES
     for row in range(STATES):
         for column in range(row + 1):
             band[row - column, column:size:STATES] += part.states[:, row, column]
-    factor = cholesky_banded(band, lower=True)
+    factor, trouble = dpbtrf(band, lower=1, overwrite_ab=1)
+    if trouble:
+        raise np.linalg.LinAlgError("the states' precision must be positive definite")
     log_det = 2.0 * float(np.sum(np.log(factor[0])))
-    mixed = part.mixed.reshape(size, -1)
-    taken = mixed.T @ cho_solve_banded((factor, True), mixed)
-    return part.whole.sum(axis=0) - taken, -0.5 * (log_det - prior_log_det)
+    # With S = L·Lᵀ, mᵀ·S⁻¹·m is the square of L⁻¹·m: half of a solution is enough.
+    half, _ = dtbtrs(factor, part.mixed.reshape(size, -1), uplo="L")
+    return part.whole.sum(axis=0) - half.T @ half, -0.5 * (log_det - prior_log_det)
 
 
 def _prior_band(time: FloatArray, wander: Wander) -> tuple[FloatArray, float]:
@@ -226,8 +228,7 @@ def likeliest(part: Reduced, prior: Prior, at: FloatArray) -> Wander:
 
     def score(tried: Wander) -> float:
         if tried not in scores:
-            information, loss = marginal(part, tried)
-            scores[tried] = _posterior(information, loss, prior, at, tried).evidence
+            scores[tried] = _evidence(*marginal(part, tried), prior, at)
         return scores[tried]
 
     best = Wander()
@@ -241,26 +242,39 @@ def likeliest(part: Reduced, prior: Prior, at: FloatArray) -> Wander:
     return best
 
 
+def _normal(
+    information: FloatArray, prior: Prior, at: FloatArray
+) -> tuple[FloatArray, FloatArray, float]:
+    """Matrix and gradient of a Gauss–Newton step of what moves, and the square at ``at``."""
+    moving = prior.width > 0.0
+    precision = prior.precision[moving]
+    pull = precision * (at - prior.mean)[moving]
+    matrix = information[:-1, :-1][np.ix_(moving, moving)] + np.diag(precision)
+    gradient = information[:-1, -1][moving] + pull
+    return matrix, gradient, float(information[-1, -1] + (at - prior.mean)[moving] @ pull)
+
+
+def _evidence(information: FloatArray, loss: float, prior: Prior, at: FloatArray) -> float:
+    """Logarithm of how likely the data are, the parameters integrated out around their best."""
+    matrix, gradient, square = _normal(information, prior, at)
+    gain = float(gradient @ np.linalg.solve(matrix, gradient))
+    precision = prior.precision[prior.width > 0.0]
+    spread = float(np.linalg.slogdet(matrix)[1] - np.sum(np.log(precision[precision > 0.0])))
+    return loss - 0.5 * (square - gain + spread)
+
+
 def _posterior(
     information: FloatArray, loss: float, prior: Prior, at: FloatArray, wander: Wander
 ) -> Posterior:
     """One Gauss–Newton step from ``at`` with a Gaussian prior."""
+    matrix, gradient, _ = _normal(information, prior, at)
     moving = prior.width > 0.0
-    precision = prior.precision[moving]
-    away = (at - prior.mean)[moving]
-    matrix = information[:-1, :-1][np.ix_(moving, moving)] + np.diag(precision)
-    gradient = information[:-1, -1][moving] + precision * away
     covariance = np.linalg.pinv(matrix, hermitian=True)
-    step = -covariance @ gradient
-    square = float(information[-1, -1] + away @ (precision * away) + gradient @ step)
-    log_det = float(np.linalg.slogdet(matrix)[1])
-    prior_log_det = float(np.sum(np.log(precision[precision > 0.0])))
     parameters = at.copy()
-    parameters[moving] += step
+    parameters[moving] -= covariance @ gradient
     whole = np.zeros((len(at), len(at)))
     whole[np.ix_(moving, moving)] = covariance
-    evidence = loss - 0.5 * (square + log_det - prior_log_det)
-    return Posterior(parameters, whole, evidence, wander)
+    return Posterior(parameters, whole, _evidence(information, loss, prior, at), wander)
 
 
 def posterior(

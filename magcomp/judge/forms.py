@@ -7,11 +7,11 @@ the one to believe (docs/method.md, Motor by motor).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from magcomp.align import interpolate
 from magcomp.fit import Problem, folds, spread
 from magcomp.fit.field_model import (
     correction_at,
@@ -19,7 +19,7 @@ from magcomp.fit.field_model import (
     strength_and_dip,
 )
 from magcomp.fit.flight import prior
-from magcomp.fit.nearest import nearest
+from magcomp.fit.nearest import moved, nearest
 from magcomp.fit.robust import spread_of
 from magcomp.geometry import heading_shift
 from magcomp.judge.evidence import used_lags
@@ -58,7 +58,7 @@ def forms(
     problem: Problem,
     fit: MotorFit,
     motors: Control | None,
-    others: Sequence[tuple[Problem, MotorFit]],
+    throttle: Control | None,
 ) -> tuple[Form, ...]:
     """Compare what the field may follow, the simplest first.
 
@@ -68,12 +68,15 @@ def forms(
         A flight and its fit by one current.
     motors
         The current of each motor, where known.
-    others
-        The same compass fitted by other quantities.
+    throttle
+        The throttle, where known.
     """
     samples = problem.sample(used_lags(fit))
     tried = [_tried(fit.regressor, problem, fit)]
-    tried += [_tried(other.regressor, of, other) for of, other in others]
+    if throttle is not None:
+        tried.append(
+            _tried(throttle.kind, replace(problem, control=throttle), fit, problem.control)
+        )
     tried.append(_tried(CURVED, _curved(problem, samples), fit))
     if motors is not None:
         tried.append(_tried(MOTORS, replace(problem, control=motors), fit))
@@ -111,11 +114,19 @@ def _curved(problem: Problem, samples: Samples) -> Problem:
     return replace(problem, control=replace(problem.control, series=Series(series.time, parts)))
 
 
-def _tried(name: str, problem: Problem, fit: MotorFit) -> _Tried:
-    """A form solved beside a fit of one quantity, on each part of the flight in turn."""
+def _tried(name: str, problem: Problem, fit: MotorFit, base: Control | None = None) -> _Tried:
+    """A form solved beside a fit of one quantity, on each part of the flight in turn.
+
+    Where it has none of that quantity, ``base``, it begins at what is nearest to the fit.
+    """
     lags = used_lags(fit)
     samples = problem.sample(lags)
-    start = parameters_of(replace(fit, correction=_begun(fit.correction, name, samples)), lags)
+    begun = _begun(fit.correction, name, samples)
+    if base is not None:
+        then = samples.time - lags.regressor
+        added = fit.correction.added(interpolate(base.series, then))
+        begun = moved(fit.correction, nearest(added, samples.u)[0])
+    start = parameters_of(replace(fit, correction=begun), lags)
     values, slopes = strength_and_dip(samples, start)
     scale = spread_of(values)
     root = 1.0 / scale / np.sqrt(np.sqrt(1.0 + (values / scale / 2.0) ** 2))

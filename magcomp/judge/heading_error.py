@@ -11,6 +11,7 @@ from magcomp.fit.nearest import moved, nearest
 from magcomp.geometry import body_from_earth, heading_shift, level_matrix, wrap_angle
 from magcomp.model import (
     CORRECTION_SIZE,
+    MOTOR,
     OFFSET,
     SOFT_IRON,
     Control,
@@ -143,6 +144,26 @@ def heading_errors(
             )
         )
     return tuple(rows)
+
+
+def variance_shares(fit: MotorFit, u: float) -> dict[str, float]:
+    """Variance of the heading that each group of parameters makes at ``u``, where it is largest.
+
+    Returns
+    -------
+    dict
+        Square radians by ``"motor"``, ``"offset"`` and ``"soft iron"``.
+    """
+    roll, pitch, yaw = attitudes()
+    field = _field_at(fit, roll, pitch, yaw)
+    centred = (field - u * fit.correction.vector) @ np.linalg.inv(fit.correction.soft_iron).T
+    slopes = _shift_slopes(field, centred, roll, pitch, u, fit)
+    worst = slopes[int(np.argmax(np.einsum("ki,ij,kj->k", slopes, fit.covariance, slopes)))]
+    groups = {"motor": MOTOR, "offset": OFFSET, "soft iron": SOFT_IRON}
+    return {
+        name: float(worst[part] @ fit.covariance[part, part] @ worst[part])
+        for name, part in groups.items()
+    }
 
 
 def level_errors(fit: MotorFit, present: Correction, u: float, present_u: float) -> FloatArray:

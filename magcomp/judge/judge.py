@@ -19,6 +19,7 @@ from magcomp.judge.heading_error import (
     present_by,
 )
 from magcomp.judge.keep import is_close, keep
+from magcomp.judge.lacking import lacking
 from magcomp.judge.motors import on_motors
 from magcomp.judge.thresholds import Thresholds
 from magcomp.judge.whole import on_constancy, on_earth
@@ -32,6 +33,7 @@ from magcomp.model import (
     Grade,
     HeadingError,
     MotorFit,
+    Samples,
     Verdict,
     quantity_of,
 )
@@ -103,10 +105,10 @@ def judge(
     findings = [
         *(Finding(Grade.REJECTED, complaint) for complaint in complaints),
         *on_earth(problem, samples, fit),
-        *on_constancy(problem, fit, limits),
+        *on_constancy(problem, fit, limits, _worst_flown(fit, errors).p95),
         *on_unseen_parameters(in_force.unseen),
         *on_motors(fit, covered, limits),
-        *_findings(fit, errors, residual, covered, limits),
+        *_findings(fit, errors, residual, (samples, covered), limits),
     ]
     grade = max((f.grade for f in findings), key=severity, default=Grade.GOOD)
     fit = keep(fit, in_force.correction) if stays else fit
@@ -151,14 +153,14 @@ def _findings(
     fit: MotorFit,
     errors: tuple[HeadingError, ...],
     residual: FieldResidual,
-    covered: Coverage,
+    seen: tuple[Samples, Coverage],
     limits: Thresholds,
 ) -> Iterator[Finding]:
-    worst = _worst_flown(fit, errors)
+    worst, covered = _worst_flown(fit, errors), seen[1]
     known = worst.p95 <= limits.marginal_deg
     yield from on_control(fit.regressor, covered, limits, known=known)
     yield from _on_unseen(fit, errors, residual, limits)
-    yield from _on_bound(fit, errors, worst, limits)
+    yield from _on_bound(fit, errors, worst, seen, limits)
     yield from _on_shape(fit, residual, covered, limits, known=known)
 
 
@@ -193,8 +195,13 @@ def _fall(residual: FieldResidual) -> float:
 
 
 def _on_bound(
-    fit: MotorFit, errors: tuple[HeadingError, ...], worst: HeadingError, limits: Thresholds
+    fit: MotorFit,
+    errors: tuple[HeadingError, ...],
+    worst: HeadingError,
+    seen: tuple[Samples, Coverage],
+    limits: Thresholds,
 ) -> Iterator[Finding]:
+    samples, covered = seen
     if worst.p95 <= limits.good_deg:
         return
     tolerable = max(limits.marginal_deg, limits.lesser_evil * worst.before)
@@ -210,8 +217,8 @@ def _on_bound(
     grade = Grade.MARGINAL if worst.p95 <= tolerable else Grade.REJECTED
     yield Finding(
         grade,
-        f"the heading could still be wrong by {worst.p95:.1f}° at {_quantity(fit, worst.u)}: "
-        "record longer, turn all the way round and use the whole range of throttle",
+        f"the heading could still be wrong by {worst.p95:.1f}° at "
+        f"{_quantity(fit, worst.u)}: {lacking(fit, samples, covered, worst.u)}",
     )
 
 

@@ -19,6 +19,9 @@ _WEAKEST_SHARE, _STRONGEST_SHARE = 0.35, 2.5
 
 _DIP_WIDTHS = 4.0
 
+_DRIFTS = 1.5
+"""A step of so many times the limit is no drift whatever the bound."""
+
 
 def on_earth(problem: Problem, samples: Samples, fit: MotorFit) -> Iterator[Finding]:
     """Whether strength and dip are the earth's."""
@@ -40,14 +43,20 @@ def on_earth(problem: Problem, samples: Samples, fit: MotorFit) -> Iterator[Find
         )
 
 
-def on_constancy(problem: Problem, fit: MotorFit, limits: Thresholds) -> Iterator[Finding]:
-    """Whether the shift is straight in the control quantity and alike throughout."""
+def on_constancy(
+    problem: Problem, fit: MotorFit, limits: Thresholds, bound: float
+) -> Iterator[Finding]:
+    """Whether the shift is straight in the control quantity and alike throughout.
+
+    A small step may be a sensor's usual drift, which the bound has in it already: it matters where
+    bound and step together are more than a good fit may leave.
+    """
     if fit.method == "sweep":
         return
     found = [
         departure
         for departure in departures_of(problem, fit, used_lags(fit))
-        if departure.is_plain and departure.degrees > limits.departure_deg
+        if departure.is_plain and departure.degrees > _tolerated(departure, limits, bound)
     ]
     if found:
         # A step of one thing looks like a step of others: what explains most is what it is.
@@ -56,6 +65,14 @@ def on_constancy(problem: Problem, fit: MotorFit, limits: Thresholds) -> Iterato
             Grade.MARGINAL if likeliest.degrees < limits.marginal_deg else Grade.REJECTED,
             _words(likeliest, problem.control.kind),
         )
+
+
+def _tolerated(departure: Departure, limits: Thresholds, bound: float) -> float:
+    """Degrees a departure may have beside a bound without being spoken of."""
+    if departure.kind == "curve" or not bound < limits.good_deg:
+        return limits.departure_deg
+    left = float(np.sqrt(limits.good_deg**2 - bound**2))
+    return float(np.clip(left, limits.departure_deg, _DRIFTS * limits.departure_deg))
 
 
 def _words(departure: Departure, kind: str) -> str:

@@ -88,22 +88,21 @@ def motors(results: Sequence[CompassResult]) -> ByWidth:
     return ByWidth(columns.tables)
 
 
-def forms(results: Sequence[CompassResult]) -> Table:
+def forms(results: Sequence[CompassResult]) -> ByWidth:
     """What the field may follow: left unexplained on unseen data, and heading it costs."""
-    table = _plain_table()
-    table.add_column(Text(" left on unseen data"), min_width=_NAMES)
-    for title in ("numbers", *(f"compass {r.fit.compass}" for r in results)):
-        table.add_column(Text(title, style="bold"), justify="right")
+    columns = _Columns([result.fit.compass for result in results])
+    columns.section("left unseen, mGauss")
     for row, form in enumerate(results[0].forms):
-        cells = (_form(result.forms[row]) for result in results)
-        table.add_row(Text(f"   {form.name}", style="dim"), str(form.count), *cells)
-    return table
+        name = f"{form.name} ({form.count})"
+        columns.row(name, (_form(result.forms[row]) for result in results))
+    return ByWidth(columns.tables)
 
 
-def _form(form: Form) -> Text:
+def _form(form: Form) -> str:
+    if form.is_best:
+        return f"{form.held_out:.1f}, best"
     costs = f", {words.degrees(form.left_deg)}" if math.isfinite(form.left_deg) else ""
-    text = f"{'* ' if form.is_best else ''}{form.held_out:.1f} mGauss{costs}"
-    return Text(text, style="bold" if form.is_best else "")
+    return f"{form.held_out:.1f}{costs}"
 
 
 def _statistics(columns: _Columns, fits: Sequence[MotorFit], verdicts: Sequence[Verdict]) -> None:

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from logs_made_of_logs import Frame, frames, write
 from pymavlink.dialects.v20 import ardupilotmega as dialect
-from synthetic import EXACT, INTERFERENCE, Flown, Swept, Turned, waves
+from synthetic import EXACT, INTERFERENCE, Flown, Swept, Turned, waves, with_both
 
 from magcomp.analysis import Options, analyse, parameter_set
 from magcomp.autopilots import ardupilot
@@ -177,21 +177,6 @@ def test_a_user_who_insists_gets_the_whole_fit():
 
 
 # --- the control quantity ------------------------------------------------------------------------
-
-
-def with_both(motors_follow: str, seed: int) -> Recording:
-    """Current and throttle that wander apart (a battery that sags); the field follows one."""
-    flown = Flown(seed=seed)
-    plain = flown.recording()
-    time = plain.current.time
-    rng = np.random.default_rng([seed, 30])
-    apart = 1.0 + 0.15 * waves(rng, time, 30.0, 6.0)
-    follows = plain.current.value
-    other = np.maximum(follows * apart, 0.0)
-    current, percent = (follows, other) if motors_follow == "current" else (other, follows)
-    return replace(
-        plain, current=Series(time, current), throttle=Series(time, np.clip(percent / 60.0, 0, 1))
-    )
 
 
 @pytest.mark.parametrize("follows", ["current", "throttle"])

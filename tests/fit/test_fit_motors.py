@@ -108,7 +108,7 @@ def test_what_differs_in_a_turn_asks_for_turns():
 def best_of(flown):
     problem = problem_of(flown, motors=False)
     motors = currents_of_motors(flown.recording())[0]
-    tried = forms(problem, fit(problem), motors, [])
+    tried = forms(problem, fit(problem), motors, None)
     return {form.name: form for form in tried}, next(f.name for f in tried if f.is_best)
 
 

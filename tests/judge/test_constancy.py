@@ -9,6 +9,7 @@ import pytest
 from synthetic import EXACT, Flown, problem_of
 
 from magcomp.fit import fit
+from magcomp.judge import Thresholds, whole
 from magcomp.judge.constancy import Departure, departures_of
 from magcomp.judge.judge import judge
 from magcomp.model import Grade, Recording, Series
@@ -84,3 +85,34 @@ def test_a_complaint_about_a_sensor_rejects(sound):
     verdict = judge(problem, fit(problem, "flight"), complaints=("compass 1 is frozen",))[1]
     assert verdict.grade is Grade.REJECTED
     assert verdict.reasons[0] == "compass 1 is frozen"
+
+
+# --- a small step beside a small bound -------------------------------------------------------
+
+
+def grades(recording: Recording, monkeypatch, departure: Departure, bound: float) -> list[Grade]:
+    problem = problem_of(recording)
+    fitted = fit(problem, "flight")
+    monkeypatch.setattr(whole, "departures_of", lambda *_: (departure,))
+    return [finding.grade for finding in whole.on_constancy(problem, fitted, Thresholds(), bound)]
+
+
+@pytest.mark.parametrize(
+    ("kind", "degrees", "bound", "found"),
+    [
+        ("step", 1.3, 1.5, []),
+        ("step", 1.4, 1.5, [Grade.MARGINAL]),
+        ("motors", 1.45, 0.5, []),
+        ("place", 1.55, 0.5, [Grade.MARGINAL]),
+        ("step", 1.1, 1.9, [Grade.MARGINAL]),
+        ("step", 1.1, 3.0, [Grade.MARGINAL]),
+        ("step", 0.9, 3.0, []),
+        ("curve", 1.1, 0.5, [Grade.MARGINAL]),
+        ("step", 6.5, 0.5, [Grade.REJECTED]),
+    ],
+)
+def test_a_step_passes_where_bound_and_step_together_are_good(
+    sound, monkeypatch, kind, degrees, bound, found
+):
+    departure = Departure(kind, degrees, 0.1, 5.0, 60.0, 100.0)
+    assert grades(sound, monkeypatch, departure, bound) == found

@@ -1,0 +1,124 @@
+"""Current or throttle: which of the two predicts readings that a fit did not see."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from magcomp.errors import MagcompError
+from magcomp.fit import Problem, best_form, fit_alike, solvable
+from magcomp.judge import field_residual
+from magcomp.model import CURRENT, MOTORS, THROTTLE, Control, Grade, MotorFit, Verdict
+
+BETTER = 0.97
+"""Throttle is written instead of current only where it leaves less than this share unexplained:
+current needs no battery at the same voltage."""
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """One compass fitted against one control quantity, and the verdict."""
+
+    problem: Problem
+    fit: MotorFit
+    verdict: Verdict
+
+    @property
+    def held_out(self) -> float:
+        """The residual on unseen readings, mGauss."""
+        return self.verdict.residual.held_out
+
+    @property
+    def is_rejected(self) -> bool:
+        """Whether it must not be written."""
+        return self.verdict.grade is Grade.REJECTED
+
+
+def beaten(by_current: Sequence[Judged], forms: Sequence[Control]) -> tuple[float, ...]:
+    """What throttle leaves on unseen readings where that is plainly no better; else nothing.
+
+    A fit of its own costs as much as that by current, and is thrown away on most logs. Throttle
+    with the same parameters open shows as well that it is not needed.
+
+    Parameters
+    ----------
+    by_current
+        Every compass, fitted by current.
+    forms
+        Of the throttle.
+
+    Returns
+    -------
+    tuple of float
+        mGauss, a compass each; empty where only whole fits can tell.
+    """
+    if all(each.is_rejected for each in by_current):
+        return ()
+    if any(each.fit.method != "flight" for each in by_current):
+        return ()
+    try:
+        left = _left_by(by_current, forms)
+    except MagcompError:
+        return ()
+    is_better = _typical(left) < BETTER * _typical([each.held_out for each in by_current])
+    return () if is_better else tuple(left)
+
+
+def _left_by(by_current: Sequence[Judged], forms: Sequence[Control]) -> list[float]:
+    left = []
+    for each in by_current:
+        with solvable(each.fit.compass):
+            problem = best_form([_against(each.problem, form) for form in forms])
+            forms = [problem.control]
+            residual, _ = field_residual(problem, fit_alike(problem, each.fit))
+        left.append(residual.held_out)
+    return left
+
+
+def _against(problem: Problem, control: Control) -> Problem:
+    return Problem(problem.readings, control, problem.in_force, problem.earth)
+
+
+def better(judged: Mapping[str, Sequence[Judged]]) -> str:
+    """The control quantity that predicts held-out readings better; current where it is close.
+
+    Parameters
+    ----------
+    judged
+        Every compass fitted and judged, by kind; at least one kind.
+    """
+    if len(judged) == 1:
+        return next(iter(judged))
+    rejected = {kind: all(j.is_rejected for j in results) for kind, results in judged.items()}
+    if rejected[THROTTLE] or rejected[CURRENT]:
+        return CURRENT if rejected[THROTTLE] else THROTTLE
+    # A sweep's residual rows have three components, the others' two.
+    left = {
+        kind: [j.held_out / np.sqrt(2 + (j.fit.method == "sweep")) for j in results]
+        for kind, results in judged.items()
+    }
+    return THROTTLE if _typical(left[THROTTLE]) < BETTER * _typical(left[CURRENT]) else CURRENT
+
+
+def _typical(left: Sequence[float]) -> float:
+    return float(np.exp(np.mean(np.log(np.maximum(left, 1e-6)))))
+
+
+def comparison(held_out: Mapping[str, Sequence[float]], chosen: str) -> str:
+    """In words, why this control quantity was chosen.
+
+    Parameters
+    ----------
+    held_out
+        By kind, what each compass' fit leaves of unseen readings, mGauss.
+    chosen
+        The kind that was.
+    """
+    scores = ", ".join(
+        f"{kind} leaves {'/'.join(f'{left:.1f}' for left in each)} mGauss"
+        for kind, each in held_out.items()
+    )
+    why = "was asked for" if chosen == MOTORS else "is the better choice on held-out data"
+    return f"{chosen} is used because it {why}: {scores}"

@@ -1,0 +1,75 @@
+"""Throttle is asked only as much as it takes to see that it is no better than current."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from synthetic import Turned, problem_of, with_both
+
+from magcomp.align import controls, expected_earth, readings, reported
+from magcomp.analysis.compare import Judged, beaten, better, comparison
+from magcomp.fit import Problem, fit
+from magcomp.judge import judge
+from magcomp.model import CURRENT, THROTTLE, Control, Grade, Recording
+
+
+def judged(problem: Problem, method: str = "auto") -> Judged:
+    return Judged(problem, *judge(problem, fit(problem, method)))
+
+
+def forms(recording: Recording) -> list[Control]:
+    return [control for control in controls(recording) if control.kind == THROTTLE]
+
+
+def by_throttle(recording: Recording) -> Judged:
+    problem = Problem(
+        readings(recording, 1),
+        forms(recording)[0],
+        reported(controls(recording)),
+        expected_earth(recording),
+    )
+    return judged(problem)
+
+
+@pytest.fixture(scope="module")
+def by_current_best() -> tuple[Recording, Judged]:
+    recording = with_both(CURRENT, 5)
+    return recording, judged(problem_of(recording))
+
+
+def test_throttle_that_is_no_better_is_beaten_with_what_a_fit_of_its_own_leaves(by_current_best):
+    recording, current = by_current_best
+    (left,) = beaten([current], forms(recording))
+    assert left > current.held_out
+    assert left == pytest.approx(by_throttle(recording).held_out, rel=0.05)
+
+
+def test_throttle_that_is_better_needs_a_fit_of_its_own():
+    recording = with_both(THROTTLE, 5)
+    current = judged(problem_of(recording))
+    assert beaten([current], forms(recording)) == ()
+    assert better({CURRENT: [current], THROTTLE: [by_throttle(recording)]}) == THROTTLE
+
+
+def test_a_current_that_is_rejected_beats_nothing(by_current_best):
+    recording, current = by_current_best
+    rejected = replace(current, verdict=replace(current.verdict, grade=Grade.REJECTED))
+    assert beaten([rejected], forms(recording)) == ()
+    assert beaten([rejected, current], forms(recording)) != ()
+
+
+def test_only_flights_can_be_compared_in_short():
+    recording = Turned(seed=1).recording()
+    by_levels = judged(problem_of(recording), "levels")
+    assert beaten([by_levels], forms(recording)) == ()
+
+
+def test_one_kind_alone_is_the_better(by_current_best):
+    assert better({THROTTLE: [by_current_best[1]]}) == THROTTLE
+
+
+def test_the_scores_are_told_by_kind():
+    told = comparison({CURRENT: (1.04, 2.0), THROTTLE: (1.5, 2.25)}, CURRENT)
+    assert told.startswith("current is used because")
+    assert told.endswith("current leaves 1.0/2.0 mGauss, throttle leaves 1.5/2.2 mGauss")
