@@ -29,9 +29,9 @@ def nearest(added: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
     Examples
     --------
     >>> u = np.array([[0.0], [1.0], [2.0]])
-    >>> found, left = nearest(5.0 + u * [[1.0, 0.0, -1.0]], u)
+    >>> found, left = nearest(5.0 + u * [[1.0, 2.0, -1.0]], u)
     >>> found.round(6).tolist()
-    [[5.0, 5.0, 5.0], [1.0, 0.0, -1.0]]
+    [[5.0, 5.0, 5.0], [1.0, 2.0, -1.0]]
     """
     design = np.column_stack([np.ones(len(u)), u])
     found: FloatArray = np.linalg.lstsq(design, added, rcond=None)[0].astype(np.float64)

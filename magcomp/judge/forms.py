@@ -7,7 +7,9 @@ the one to believe (docs/method.md, Motor by motor).
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import reduce
 
 import numpy as np
 
@@ -24,7 +26,6 @@ from magcomp.fit.robust import spread_of
 from magcomp.geometry import heading_shift
 from magcomp.judge.evidence import used_lags
 from magcomp.model import (
-    MOTORS,
     BoolArray,
     Control,
     Correction,
@@ -42,7 +43,7 @@ MOST = 0.99
 """Heading errors in flight are those that this share of the readings does not exceed."""
 
 CURVED = "curved current"
-_MOST_FREE = 4
+_MOST_FREE, _LEAST_FOLDS = 4, 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,15 +72,20 @@ def forms(
     throttle
         The throttle, where known.
     """
-    samples = problem.sample(used_lags(fit))
-    tried = [_tried(fit.regressor, problem, fit)]
-    if throttle is not None:
-        tried.append(
-            _tried(throttle.kind, replace(problem, control=throttle), fit, problem.control)
-        )
-    tried.append(_tried(CURVED, _curved(problem, samples), fit))
-    if motors is not None:
-        tried.append(_tried(MOTORS, replace(problem, control=motors), fit))
+    whole = problem.sample(used_lags(fit))
+    against = {fit.regressor: problem, CURVED: _curved(problem, whole)}
+    for control in (throttle, motors):
+        if control is not None:
+            against[control.kind] = replace(problem, control=control)
+    against = _of_the_same_readings(against)
+    samples = against[fit.regressor].sample(used_lags(fit))
+    if len(np.unique(folds(samples.time))) < _LEAST_FOLDS:
+        return ()
+    tried = [
+        _tried(name, of, fit, problem.control if of.control is throttle else None)
+        for name, of in against.items()
+    ]
+    tried.sort(key=lambda each: each.count)
     best = tried[0]
     for each in tried[1:]:
         if each.held_out < CLEARLY * best.held_out:
@@ -98,6 +104,12 @@ def forms(
         )
         for each in tried
     )
+
+
+def _of_the_same_readings(against: Mapping[str, Problem]) -> dict[str, Problem]:
+    """Each with the readings that none of the others has in a gap of its quantity."""
+    common = reduce(np.intersect1d, (each.readings.time for each in against.values()))
+    return {name: each.where(np.isin(each.readings.time, common)) for name, each in against.items()}
 
 
 def left_deg(left: FloatArray, field: FloatArray, samples: Samples) -> float:
@@ -131,12 +143,16 @@ def _tried(name: str, problem: Problem, fit: MotorFit, base: Control | None = No
     scale = spread_of(values)
     root = 1.0 / scale / np.sqrt(np.sqrt(1.0 + (values / scale / 2.0) ** 2))
     known = prior(problem, _MOST_FREE)
-    precision = np.diag(np.where(known.width > 0.0, known.precision, 1e12))
+    moving = known.width > 0.0
+    precision = np.diag(known.precision[moving])
 
     def solved(rows: BoolArray) -> FloatArray:
-        flat = (slopes[rows] * root[rows][:, :, None]).reshape(-1, slopes.shape[2])
+        flat = (slopes[rows][:, :, moving] * root[rows][:, :, None]).reshape(-1, moving.sum())
         left = (values[rows] * root[rows]).reshape(-1)
-        return np.asarray(-np.linalg.solve(flat.T @ flat + precision, flat.T @ left))
+        step = np.zeros(len(start))
+        # A form that the readings do not determine is solved as far as they do.
+        step[moving] = -np.linalg.pinv(flat.T @ flat + precision, hermitian=True) @ flat.T @ left
+        return step
 
     fold = folds(samples.time)
     parts = [fold == index for index in np.unique(fold) if np.any(fold != index)]
