@@ -115,4 +115,6 @@ def sentence(text: str) -> str:
 
 def printable(name: str) -> str:
     """A file's name without what a terminal would obey."""
+    if name.isprintable():
+        return name
     return "".join(c if c.isprintable() else "?" for c in name)
