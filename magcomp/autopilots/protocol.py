@@ -92,6 +92,19 @@ class Autopilot(Protocol):
         ...
 
     @property
+    def corrected_message(self) -> str | None:
+        """Telemetry message with what the firmware makes of the compass it uses, in body axes.
+
+        None where the compasses' own messages say it.
+        """
+        ...
+
+    @property
+    def corrected_unit(self) -> float:
+        """MGauss of one in that message."""
+        ...
+
+    @property
     def storage_s(self) -> float:
         """Seconds after which a write survives a restart."""
         ...
