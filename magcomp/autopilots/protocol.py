@@ -92,6 +92,11 @@ class Autopilot(Protocol):
         ...
 
     @property
+    def offset_decimals(self) -> int:
+        """So many decimals of an offset are finer than a heading can tell."""
+        ...
+
+    @property
     def corrected_message(self) -> str | None:
         """Telemetry message with what the firmware makes of the compass it uses, in body axes.
 
