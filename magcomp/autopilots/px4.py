@@ -115,6 +115,9 @@ class Px4:
     batteries = (0, 1)
     first_slot_leads = False
     first_compass_message = "SCALED_IMU"
+    offset_decimals = 4
+    corrected_message = "HIGHRES_IMU"
+    corrected_unit = MGAUSS
     storage_s = 2.5  # it saves all at once, 0.3 s after a change and not again for 2 s
     motor_test = Px4MotorTest()
     device_ids_describe = "bus, address and type of a sensor, which are alike in vehicles of a kind"
