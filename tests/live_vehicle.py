@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from magcomp.simulate import Faults, FaultyLink, Machine, Vehicle, run, scenario
 from magcomp.simulate.transports import open_transport
 
-PATIENCE_S = 60.0
+PATIENCE_S = 300.0
 
 
 @dataclass(frozen=True)

@@ -212,6 +212,17 @@ def test_the_covariance_is_widened_where_the_folds_disagree_by_more_than_it_says
     assert np.diag(honest.covariance)[MOTOR].max() < 10 * np.diag(found.covariance)[MOTOR].max()
 
 
+def test_a_sweep_is_no_surer_than_its_folds_agree():
+    problem = Swept(seed=3).problem()
+    found = fit(problem, "sweep")
+    _, motors = evidence.field_residual(problem, found)
+    motors = motors.reshape(len(motors), -1)
+    scatter = (len(motors) - 1) / len(motors) * np.sum((motors - motors.mean(axis=0)) ** 2, axis=0)
+    judged, _ = judge(problem, replace(found, covariance=1e-6 * found.covariance))
+    floor = (0.005 * np.linalg.norm(found.correction.motor)) ** 2
+    assert np.sum(np.diag(judged.covariance)[MOTOR] - floor) > 0.5 * np.sum(scatter)
+
+
 def test_a_quarter_of_the_doubt_is_added_for_what_is_alike_in_every_block():
     problem = Flown(seed=4).problem()
     found = fit(problem, "flight")

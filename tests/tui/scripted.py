@@ -35,7 +35,7 @@ from magcomp.writing.events import (
 from magcomp.writing.files import read_parameter_file, write_parameter_file
 from magcomp.writing.plan import WritePlan, plan
 
-PATIENCE_S = 90.0
+PATIENCE_S = 300.0
 DEVICES = dict(zip(("", "2", "3"), made.QUAD.device_ids, strict=True))
 
 
