@@ -77,7 +77,7 @@ def calibrate(
     ) as session:
         session.manoeuvre = None if manoeuvre is None else Manoeuvre(manoeuvre)
         _collect(session, link.timeout, limit)
-        return finish(session, options, record_to, wishes)
+        return finish(session, options, record_to, wishes, link)
 
 
 def _collect(session: LiveSession, timeout: float, limit: float) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Iterator
 from dataclasses import asdict
 from datetime import UTC, datetime
@@ -148,7 +149,7 @@ def _verdict(recording: Recording, found: Contents, columns: int) -> Iterator[st
             yield from wrapped(why, columns)
     for note in recording.report.notes:
         yield from wrapped(words.sentence(note), columns)
-    log = words.printable(recording.source)
+    log = shlex.quote(words.printable(recording.source))
     if not found.missing:
         yield f" Nothing is missing. To fit it: magcomp fit {log}"
         return

@@ -73,6 +73,8 @@ class LinkOptions:
         Seconds to wait for it.
     source_system
         The number that magcomp gives itself.
+    key_file
+        Where the key was read.
     """
 
     system: int | None
@@ -81,6 +83,26 @@ class LinkOptions:
     key: bytes | None = field(repr=False)
     timeout: float
     source_system: int = GROUND_STATION_SYSTEM
+    key_file: Path | None = None
+
+    @property
+    def options(self) -> tuple[str, ...]:
+        """What to type so that another command reaches the same vehicle the same way."""
+        given = {
+            "--system": self.system,
+            "--component": self.component,
+            "--baud": self.baud,
+            "--signing-key": self.key_file,
+            "--source-system": (
+                None if self.source_system == GROUND_STATION_SYSTEM else self.source_system
+            ),
+        }
+        return tuple(
+            word
+            for name, value in given.items()
+            if value is not None
+            for word in (name, str(value))
+        )
 
 
 def link_options(command: Callable[..., _Result]) -> Callable[..., _Result]:
@@ -134,7 +156,9 @@ def reach_options(command: Callable[..., _Result]) -> Callable[..., _Result]:
         key = None if signing_key is None else read_signing_key(signing_key)
         if signing_key is not None and is_read_by_others(signing_key):
             complain(f"{signing_key} can be read by others on this computer: chmod 600 keeps it")
-        return command(link=LinkOptions(None, None, baud, key, timeout, source_system), **others)
+        return command(
+            link=LinkOptions(None, None, baud, key, timeout, source_system, signing_key), **others
+        )
 
     return with_reach
 

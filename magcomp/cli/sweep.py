@@ -97,7 +97,7 @@ def sweep(
             raise_for_failure(outcome)
             return ExitCode.INTERRUPTED
         options = Options(method="sweep", regressor=CURRENT)
-        return finish(session, options, record_to, wishes)
+        return finish(session, options, record_to, wishes, link)
 
 
 def _ask(bench: Bench) -> str:

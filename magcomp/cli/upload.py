@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -114,9 +114,12 @@ def upload(
 class VehicleLink:
     """A vehicle to be written, without recording anything."""
 
-    def __init__(self, connection: Connection, latest: Latest, vehicle: Vehicle) -> None:
+    def __init__(
+        self, connection: Connection, latest: Latest, vehicle: Vehicle, options: Sequence[str]
+    ) -> None:
         self.connection = connection
         self.vehicle = vehicle
+        self._options = options
         self._latest = latest
 
     @classmethod
@@ -150,7 +153,7 @@ class VehicleLink:
                 vehicle = connection.wait_vehicle(link.timeout)
             finally:
                 status.clear()
-            yield cls(connection, latest, vehicle)
+            yield cls(connection, latest, vehicle, link.options)
 
     def write(
         self, wanted: ParameterSet, writing: Writing, *, nothing: str = ""
@@ -162,7 +165,7 @@ class VehicleLink:
         nothing
             What to say where the vehicle holds everything already.
         """
-        address = str(self.connection.address)
+        reach = (str(self.connection.address), *self._options)
         plan = self._plan(wanted, writing)
         show_difference(plan, everything=writing.everything)
         if not plan.changes:
@@ -190,11 +193,11 @@ class VehicleLink:
                     stop=stopped,
                 ),
                 backup,
-                address,
+                reach,
                 stop,
             )
         if code is ExitCode.GOOD:
-            complain(f"To undo this:\n  {restore_command(backup, address)}")
+            complain(f"To undo this:\n  {restore_command(backup, *reach)}")
         return code, plan
 
     def _plan(self, wanted: ParameterSet, writing: Writing) -> WritePlan:

@@ -12,7 +12,13 @@ from typing import TypeVar
 import click
 
 from magcomp.analysis import Options, parameter_set
-from magcomp.cli.linking import any_vehicle_option, replayed, stop_on_interrupt, yes_option
+from magcomp.cli.linking import (
+    LinkOptions,
+    any_vehicle_option,
+    replayed,
+    stop_on_interrupt,
+    yes_option,
+)
 from magcomp.cli.options import check_output, json_option
 from magcomp.cli.output import answer, complain, look, progress
 from magcomp.cli.writing import agreed, carry_out, need_consent, show_difference
@@ -117,7 +123,13 @@ def recording_file(record_to: Path | None, address: str, wishes: Wishes) -> Path
     return chosen
 
 
-def finish(session: LiveSession, options: Options, record_to: Path, wishes: Wishes) -> ExitCode:
+def finish(
+    session: LiveSession,
+    options: Options,
+    record_to: Path,
+    wishes: Wishes,
+    link: LinkOptions,
+) -> ExitCode:
     """Fit what was recorded, show the answer, and write it where asked."""
     recording, analysis = _fit(session, options, record_to)
     chosen = parameter_set(analysis)
@@ -125,7 +137,7 @@ def finish(session: LiveSession, options: Options, record_to: Path, wishes: Wish
     if analysis.grade is Grade.REJECTED:
         complain("Nothing is written because no compass has a fit to be trusted")
         return ExitCode.REJECTED
-    return _upload(session, chosen, wishes) if wishes.upload else ExitCode.GOOD
+    return _upload(session, chosen, wishes, link) if wishes.upload else ExitCode.GOOD
 
 
 def _fit(session: LiveSession, options: Options, record_to: Path) -> tuple[Recording, Analysis]:
@@ -160,7 +172,9 @@ def _show(recording: Recording, analysis: Analysis, chosen: ParameterSet, wishes
         complain(f"Written to {written}")
 
 
-def _upload(session: LiveSession, chosen: ParameterSet, wishes: Wishes) -> ExitCode:
+def _upload(
+    session: LiveSession, chosen: ParameterSet, wishes: Wishes, link: LinkOptions
+) -> ExitCode:
     """Show the difference, ask, wait for the motors to stand still, write."""
     plan = session.upload_plan(chosen, wishes.any_vehicle)
     show_difference(plan, to_stderr=wishes.to_json)
@@ -171,16 +185,16 @@ def _upload(session: LiveSession, chosen: ParameterSet, wishes: Wishes) -> ExitC
     if not agreed(len(plan.changes), yes=wishes.yes):
         complain("Nothing is written")
         return ExitCode.INTERRUPTED
-    address = str(session.connection.address)
+    reach = (str(session.connection.address), *link.options)
     backup = new_file("backup", ".param", plan.vehicle, time.time())
     with stop_on_interrupt() as stop:
         code = carry_out(
             plan,
             lambda tell, stopped: session.upload(plan, backup, tell, stopped),
             backup,
-            address,
+            reach,
             stop,
         )
     if code is ExitCode.GOOD:
-        complain(f"To undo this:\n  {restore_command(backup, address)}")
+        complain(f"To undo this:\n  {restore_command(backup, *reach)}")
     return code

@@ -110,9 +110,14 @@ def agreed(count: int, *, yes: bool) -> bool:
 
 
 def carry_out(
-    plan: WritePlan, write: Write, backup: Path, address: str, stop: threading.Event
+    plan: WritePlan, write: Write, backup: Path, reach: Sequence[str], stop: threading.Event
 ) -> ExitCode:
     """Write with progress, and say how it ended.
+
+    Parameters
+    ----------
+    reach
+        The vehicle's address, and the options by which it was reached.
 
     Raises
     ------
@@ -141,17 +146,17 @@ def carry_out(
     outcome = write(tell, stop.is_set)
     status.clear()
     if outcome.reason is Reason.STOPPED:
-        complain_of(outcome, backup, address)
+        complain_of(outcome, backup, reach)
         return ExitCode.INTERRUPTED
-    raise_for_failure(outcome, backup, address)
+    raise_for_failure(outcome, backup, *reach)
     complain(f"Written and read back: {len(plan.changes)} parameters")
     say_what_is_held(plan, after=True)
     return ExitCode.GOOD
 
 
-def complain_of(outcome: Outcome, backup: Path, address: str) -> None:
+def complain_of(outcome: Outcome, backup: Path, reach: Sequence[str]) -> None:
     """Say what stands after an interruption."""
     try:
-        raise_for_failure(outcome, backup, address)
+        raise_for_failure(outcome, backup, *reach)
     except MagcompError as error:
         complain(str(error))

@@ -10,6 +10,11 @@ from magcomp.writing.fence import Fence
 from magcomp.writing.stages import FENCED, WRITING
 from magcomp.writing.watch import VehicleWatch
 
+BELIEVED_READS = 2
+BELIEVED_ECHOES = 12  # at 30 % loss a good write is lost that often once in 10⁶
+BELIEVED_REFUSALS = 8
+"""So often another value than the wanted one must come before it is believed."""
+
 
 @dataclass(frozen=True)
 class Waiting:

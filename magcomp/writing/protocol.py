@@ -27,8 +27,6 @@ Rules
    come, and end with another, when boot time has been seen once more. SETTLE, and
    WRITE after an OFF that had to be repeated, wait ``quiet`` seconds besides: a
    late copy of an old write cannot undo a newer one unseen.
-7. Refusal, silence, a lost link and a request to stop roll back, once.
-   A roll-back that fails leaves the switches 0 where they had been confirmed.
 """
 
 from __future__ import annotations
@@ -37,6 +35,7 @@ from collections.abc import Mapping
 
 from magcomp import autopilots
 from magcomp.mavlink.parameters import REAL32, ParamValue
+from magcomp.writing import patience
 from magcomp.writing.events import (
     Event,
     Intends,
@@ -63,7 +62,6 @@ from magcomp.writing.messages import (
     ReadName,
     SetValue,
 )
-from magcomp.writing.patience import Waiting, ran_out
 from magcomp.writing.plan import WritePlan
 from magcomp.writing.stages import (
     CLOSED,
@@ -79,9 +77,6 @@ from magcomp.writing.stages import (
 from magcomp.writing.watch import VehicleWatch
 
 _OWN_NUMBER = "AUTOPILOT_VERSION"
-_BELIEVED_READS = 2
-_BELIEVED_ECHOES = 12  # at 30 % loss a good write is lost that often once in 10⁶
-_BELIEVED_REFUSALS = 8
 _GATE = 0.2
 
 
@@ -238,15 +233,15 @@ class WriteSequence:
         if count == 0:
             return
         if self.stage not in WRITING:
-            if count >= _BELIEVED_READS:
+            if count >= patience.BELIEVED_READS:
                 self._believe(name, value, now)
             return
         if self.stage is not Stage.ON:
-            if count >= _BELIEVED_ECHOES:
+            if count >= patience.BELIEVED_ECHOES:
                 self._believe(name, value, now)
         elif self._exchange.attempts(name) > 1:
             self._refusals += 1
-            if self._refusals >= _BELIEVED_REFUSALS:
+            if self._refusals >= patience.BELIEVED_REFUSALS:
                 self._believe(name, value, now)
             else:
                 # The one write was lost: the values first, then the switch again.
@@ -272,8 +267,8 @@ class WriteSequence:
         if self.finished:
             return
         gated = self._gate_closed(now)
-        waiting = Waiting(self.stage, self._watch, self._exchange, self._fence, gated)
-        if (reason := ran_out(waiting, self._timing, now)) is not None:
+        waiting = patience.Waiting(self.stage, self._watch, self._exchange, self._fence, gated)
+        if (reason := patience.ran_out(waiting, self._timing, now)) is not None:
             self._fail(*reason, now)
 
     def _enter(self, stage: Stage, now: float) -> None:

@@ -18,7 +18,9 @@ OVER     nothing
 
 Patience is bounded everywhere; where it ends, a vehicle not yet touched is left
 alone and any other is rolled back. The target is the new set; rolling back is
-the same road with the old set as target, entered at SETTLE.
+the same road with the old set as target, entered at SETTLE. Refusal, silence, a lost link and a
+request to stop roll back, once. A roll-back that fails leaves the switches 0 where they had been
+confirmed.
 """
 
 from __future__ import annotations

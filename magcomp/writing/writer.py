@@ -352,13 +352,18 @@ def stands(outcome: Outcome) -> str:
     }[outcome.standing]
 
 
-def restore_command(backup: Path, address: str) -> str:
-    """What to type to bring a vehicle back."""
-    return f"magcomp restore {shlex.quote(str(backup))} {shlex.quote(address)}"
+def restore_command(backup: Path, *reach: str) -> str:
+    """What to type to bring a vehicle back: it is reached by an address and options."""
+    return shlex.join(["magcomp", "restore", str(backup), *reach])
 
 
-def raise_for_failure(outcome: Outcome, backup: Path, address: str = "ADDRESS") -> None:
+def raise_for_failure(outcome: Outcome, backup: Path, *reach: str) -> None:
     """Do nothing for a good outcome; otherwise say what happened, what stands, what to do.
+
+    Parameters
+    ----------
+    reach
+        The vehicle's address, and the options by which it was reached.
 
     Raises
     ------
@@ -382,5 +387,5 @@ def raise_for_failure(outcome: Outcome, backup: Path, address: str = "ADDRESS") 
     }
     text = f"The write failed because {outcome.why}; {stands(outcome)}."
     if outcome.standing in {Standing.OFF, Standing.UNSURE}:
-        text += f" Bring it back with:\n  {restore_command(backup, address)}"
+        text += f" Bring it back with:\n  {restore_command(backup, *(reach or ('ADDRESS',)))}"
     raise kinds.get(outcome.reason, WriteError)(text)

@@ -10,6 +10,7 @@ import pytest
 from live_vehicle import COMPENSATION, alive, held, landed
 
 from magcomp.cli.app import run
+from magcomp.cli.linking import LinkOptions
 from magcomp.errors import ExitCode
 from magcomp.model import ParameterSet
 from magcomp.simulate import CAMERA, COMPUTER, GIMBAL, Habits
@@ -105,4 +106,37 @@ def test_an_error_while_a_vehicle_is_written_says_what_the_vehicle_holds(
     said = capsys.readouterr().err
     assert "the terminal is gone" in said
     assert "while the vehicle was written: the vehicle holds everything as before" in said
+    assert held(vehicle) == before
+
+
+def test_the_options_by_which_a_vehicle_is_reached_can_be_given_again(tmp_path):
+    usual = LinkOptions(None, None, None, None, 10.0)
+    assert usual.options == ()
+    key = tmp_path / "my key"
+    other = LinkOptions(3, 2, 57600, bytes(32), 5.0, 200, key)
+    assert shlex.join(other.options) == (
+        "--system 3 --component 2 --baud 57600 "
+        f"--signing-key {shlex.quote(str(key))} --source-system 200"
+    )
+
+
+@pytest.mark.slow
+def test_the_command_that_undoes_reaches_the_vehicle_as_it_was_reached(backup, capsys, tmp_path):
+    """Pasted without its options it would get no answer."""
+    key = tmp_path / "my key"
+    key.write_bytes(bytes(range(32)))
+    key.chmod(0o600)
+    wanted = tmp_path / "wanted.param"
+    write_parameter_file(wanted, ParameterSet(COMPENSATION))
+    options = ["--system", "1", "--signing-key", str(key), "--source-system", "200"]
+    strict = {"SYSID_ENFORCE": 1.0, "SYSID_MYGCS": 200.0}
+    vehicle = landed(seed=4, parameters=strict, signing_key=key.read_bytes())
+    before = held(vehicle)
+    with alive(vehicle=vehicle) as flown:
+        where = ["--backup", str(tmp_path / "b.param"), "--yes", "--any-vehicle"]
+        assert run(["upload", str(wanted), flown.address, *where, *options]) == ExitCode.GOOD
+        assert held(vehicle) != before
+        said = capsys.readouterr().err.splitlines()
+        (line,) = [line for line in said if line.startswith("  magcomp restore")]
+        assert run([*shlex.split(line)[1:], "--yes"]) == ExitCode.GOOD
     assert held(vehicle) == before
