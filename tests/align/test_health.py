@@ -86,7 +86,7 @@ def test_strong_soft_iron_on_a_slow_link_is_no_glitch(sound):
     """Each reading of a turn then differs much from the one before."""
     field = sound.field[1]
     slow = np.arange(len(field)) % 6 == 0
-    turned = np.cumsum(np.where(field.time % 15.0 < 4.0, 0.2, 0.0))
+    turned = np.cumsum(np.where(field.time % 15.0 < 5.0, 0.1, 0.0))
     axes = np.stack([np.cos(turned), np.sin(turned), np.full(len(turned), 0.3)], axis=1)
     noise = np.random.default_rng(3).normal(size=axes.shape)
     stretched = 480.0 * axes * np.array([1.5, 0.7, 0.7]) + noise

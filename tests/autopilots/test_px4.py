@@ -27,8 +27,8 @@ from magcomp.autopilots.px4_correction import (
 )
 from magcomp.autopilots.px4_names import vector_names
 from magcomp.autopilots.px4_rotation import sensor_to_body
-from magcomp.autopilots.rotations import ROTATIONS
 from magcomp.autopilots.px4_taking_over import unsettled
+from magcomp.autopilots.rotations import ROTATIONS
 from magcomp.errors import MissingDataError, ParameterFileError
 from magcomp.model import (
     CURRENT,
