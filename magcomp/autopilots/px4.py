@@ -287,8 +287,8 @@ class Px4:
         return px4_settings.relevant_names()
 
     def useful_names(self) -> tuple[str, ...]:
-        """How the board and the compasses are turned, and the thrust curve."""
-        return (*px4_settings.turning_names(), _THRUST_CURVE)
+        """How the board and the compasses are turned, the thrust curve, the number of motors."""
+        return (*px4_settings.turning_names(), _THRUST_CURVE, self.motor_test.count_name)
 
     def output_names(self) -> tuple[str, ...]:
         """None: the log says by itself which outputs are motors."""

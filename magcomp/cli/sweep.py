@@ -26,7 +26,7 @@ from magcomp.live.sweep import sweep as carry_out_sweep
 from magcomp.model import CURRENT
 from magcomp.report import words
 from magcomp.sweeping.events import Begun, Event, Outcome, Reason, Stopping, Told
-from magcomp.sweeping.steps import LEAST_MOST, MOST_MOST, MOST_MOTORS, Step
+from magcomp.sweeping.steps import LEAST_MOST, MOST_MOST, MOST_MOTORS
 
 _DEFAULT_MOST = 50.0
 
@@ -90,13 +90,15 @@ def sweep(
             status.clear()
         complain(f"Found {words.vehicle(vehicle)}, {bench.motors} motors")
         typed = _ask(bench)
+        # Before this the vehicle may have been carried to where it stands.
+        begun = session.recording().duration_s
         outcome = _spin(session, bench, typed, status)
         session.stop_recording()
         if outcome.reason is not None:
             complain(f"Recording: {record_to}")
             raise_for_failure(outcome)
             return ExitCode.INTERRUPTED
-        options = Options(method="sweep", regressor=CURRENT)
+        options = Options(method="sweep", regressor=CURRENT, start=begun)
         return finish(session, options, record_to, wishes, link)
 
 
@@ -128,9 +130,9 @@ def _spin(session: LiveSession, bench: Bench, typed: str, status: StatusLine) ->
     def tell(event: Event) -> None:
         match event:
             case Begun(step=step, number=number):
-                status.show(f"Step {number}: {_words(step)}", "any key stops")
+                status.show(f"Step {number}: {words.sweep_step(step)}", "any key stops")
             case Told(measured=measured):
-                status.say(f"{_words(measured.step)}: {measured.current:.1f} A")
+                status.say(f"{words.sweep_step(measured.step)}: {measured.current:.1f} A")
             case Stopping(why=why):
                 status.say(f"Stopping because {why}")
             case Outcome(done=done):
@@ -144,8 +146,3 @@ def _wish(stop: threading.Event, pressed: Pressed) -> Reason | None:
     if stop.is_set():
         return Reason.INTERRUPTED
     return Reason.KEY if pressed() else None
-
-
-def _words(step: Step) -> str:
-    which = f"motor {step.motors[0]}" if len(step.motors) == 1 else f"all {len(step.motors)} motors"
-    return f"{which} at {step.share:.0%}"

@@ -121,7 +121,9 @@ def _owner(flight: Flight, boards: dict[tuple[str, str], set[str]]) -> tuple[str
 def _aircraft(
     who: tuple[str, ...], flights: list[Flight], unusable: list[Flight], limits: Thresholds
 ) -> Aircraft:
-    newest = max([*flights, *unusable], key=_when)
+    # Flights come in order of time, but for those of which none is known.
+    in_order = flights[-1:] if flights and math.isfinite(flights[-1].when) else flights
+    newest = max([*in_order, *unusable], key=_when)
     slots = sorted({flight.compass for flight in flights})
     histories = []
     changed: list[Finding] = []

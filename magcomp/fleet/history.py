@@ -10,7 +10,7 @@ from enum import IntEnum
 import numpy as np
 
 from magcomp.fleet.flights import Flight
-from magcomp.fleet.pooled import SURE, Pooled, chances_apart, change, pool
+from magcomp.fleet.pooled import SURE, Pooled, chances_apart, change, distances, is_definite, pool
 from magcomp.judge.thresholds import Thresholds
 from magcomp.model import Grade, unit_of
 from magcomp.model.recording import FloatArray, IntArray
@@ -18,6 +18,10 @@ from magcomp.model.recording import FloatArray, IntArray
 _COVARIANCE = np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2]])
 _MOTOR, _SETTINGS = slice(0, 3), slice(3, 12)
 _ALIKE = 1e-3
+_MOST_SUSPECTS = 6
+"""Flights looked at closely: which of the many that are somewhat far off is the furthest, tells
+already their distance from the mean of all."""
+
 _TILT = math.sin(math.radians(20.0))
 
 
@@ -120,8 +124,7 @@ def history(
             slot, device_id, tuple(flights), newest.regressor, None, (), (), 0.0, holds,
             tuple(findings),
         )  # fmt: skip
-    motors = np.array([flights[i].correction[_MOTOR] for i in usable])
-    covariances = _covariances(flights, usable)
+    motors, covariances = _motors(flights, usable), _covariances(flights, usable)
     at = max(flights[i].u_high for i in usable)
     shift = _shift(newest, at)
     agreeing: IntArray = np.arange(len(usable))
@@ -191,12 +194,13 @@ def _comparable(flights: Sequence[Flight]) -> list[int]:
         for i, each in enumerate(flights)
         if each.verdict != Grade.REJECTED and each.regressor == regressor
     ]
-    motors = np.array([flights[i].correction[_MOTOR] for i in asked]).reshape(-1, 3)
     covariances = _covariances(flights, asked)
-    finite = np.isfinite(motors).all(1) & np.isfinite(covariances).all((1, 2))
-    covariances[~finite] = -np.eye(3)
-    sound = np.linalg.eigvalsh(covariances)[:, 0] > 0.0
-    return [i for i, good in zip(asked, sound, strict=True) if good]
+    sound = np.isfinite(_motors(flights, asked)).all(1) & is_definite(covariances)
+    return [i for i, good in zip(asked, sound.tolist(), strict=True) if good]
+
+
+def _motors(flights: Sequence[Flight], which: Sequence[int]) -> FloatArray:
+    return np.array([flights[i].correction for i in which]).reshape(-1, 12)[:, _MOTOR]
 
 
 def _covariances(flights: Sequence[Flight], which: Sequence[int]) -> FloatArray:
@@ -221,9 +225,14 @@ class _Away:
         pooled = self.all_together if whole else pool(self.motors[among], covariances)
         # Of the others' mean a flight is as far as that, unless it drags the mean along.
         far = self.shift(self.motors[among] - pooled.motor) > self.departure_deg / 2
-        if far.any():
-            far[np.argmin(np.trace(covariances, axis1=1, axis2=2))] = True
-        return np.flatnonzero(far)
+        heaviest = int(np.argmin(np.trace(covariances, axis1=1, axis2=2)))
+        far[heaviest] |= far.any()
+        suspects = np.flatnonzero(far)
+        if len(suspects) <= _MOST_SUSPECTS:
+            return suspects
+        unlikely = distances(self.motors[among][suspects], covariances[suspects], pooled)
+        unlikely[suspects == heaviest] = np.inf
+        return np.sort(suspects[np.argsort(unlikely)[-_MOST_SUSPECTS:]])
 
 
 def _agree(among: IntArray, away: _Away) -> tuple[IntArray, list[tuple[int, float]]]:

@@ -128,6 +128,16 @@ class Replay:
         return str(self.path) if self.speed == 1.0 else f"{self.path},{self.speed:g}x"
 
 
+@dataclass(frozen=True)
+class Carried:
+    """A link that another program holds and hands on; nobody types it."""
+
+    program: str
+
+    def __str__(self) -> str:
+        return self.program
+
+
 Address = UdpServer | UdpClient | TcpClient | TcpServer | SerialLine | Replay
 
 _NETWORK: dict[str, type[UdpServer | UdpClient | TcpClient | TcpServer]] = {

@@ -11,6 +11,7 @@ from typing import Self
 from magcomp.errors import LinkError, LinkTimeoutError
 from magcomp.link.address import (
     Address,
+    Carried,
     SerialLine,
     TcpClient,
     TcpServer,
@@ -65,7 +66,7 @@ class Connection:
 
     def __init__(
         self,
-        address: Address,
+        address: Address | Carried,
         opener: Callable[[], Transport],
         *,
         system: int | None = None,

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Protocol, TypeVar
 
 from magcomp import autopilots
 from magcomp.errors import (
@@ -19,9 +20,9 @@ from magcomp.errors import (
     VehicleRefusedError,
 )
 from magcomp.link import DEFAULT_RATES
+from magcomp.link import Connection as Link
 from magcomp.link.clock import Clock
 from magcomp.live.latest import Latest
-from magcomp.live.session import LiveSession
 from magcomp.model import Recording, Vehicle
 from magcomp.sweeping.events import Event, Outcome, Reason
 from magcomp.sweeping.messages import decode, encode
@@ -36,6 +37,20 @@ RATES: Mapping[str, float] = {**DEFAULT_RATES, "GLOBAL_POSITION_INT": 5.0}
 _LONGEST_WAIT_S = 0.05
 
 _UNREACHED = {Reason.LINK_LOST: LinkError, Reason.UNANSWERED: LinkTimeoutError}
+
+_Result = TypeVar("_Result")
+
+
+class Session(Protocol):
+    """What a sweep needs of a live session; ``LiveSession`` has it."""
+
+    def recording(self) -> Recording:
+        """All that has been received so far."""
+        ...
+
+    def alone(self, work: Callable[[Link, Vehicle, Latest, Clock], _Result]) -> _Result:
+        """Let somebody speak with the vehicle while nobody else does."""
+        ...
 
 
 def _silent(_: object) -> None:
@@ -80,7 +95,7 @@ class Bench:
         return SweepSequence(self.name, motor_test, self.motors, self.most, now=now)
 
 
-def make_ready(session: LiveSession, motors: int | None, most: float) -> Bench:
+def make_ready(session: Session, motors: int | None, most: float) -> Bench:
     """Look whether a vehicle can be swept.
 
     Parameters
@@ -132,21 +147,23 @@ def motor_count(recording: Recording) -> int:
     MissingDataError
         Neither says.
     """
-    outputs = recording.outputs
+    autopilot, outputs = autopilots.of(recording), recording.outputs
+    counted = recording.parameters.last(autopilot.motor_test.count_name, 0.0)
+    if counted > 0.0:
+        return int(counted)
     motors = None
-    if outputs is not None and len(outputs):
-        width = outputs.value.shape[1]
-        motors = autopilots.of(recording).motor_outputs(recording.parameters, width)
+    if outputs is not None and len(outputs) and not autopilot.motor_test.count_name:
+        motors = autopilot.motor_outputs(recording.parameters, outputs.value.shape[1])
     if outputs is None or motors is None:
         raise MissingDataError(
-            f"{recording.source} must tell the motors' outputs (SERVO_OUTPUT_RAW); instead it "
-            "tells none. Give their number with --motors"
+            f"{recording.source} must tell how many motors there are; instead neither outputs nor "
+            "parameters do. Give their number with --motors"
         )
     return sum(bool(outputs.value[:, channel].any()) for channel in motors.channels)
 
 
 def sweep(
-    session: LiveSession,
+    session: Session,
     bench: Bench,
     typed: str,
     pressed: Callable[[], Reason | None],
@@ -168,7 +185,7 @@ def sweep(
         Told everything as it happens.
     """
 
-    def work(link: Connection, vehicle: Vehicle, _: Latest, clock: Clock) -> Outcome:
+    def work(link: Link, vehicle: Vehicle, _: Latest, clock: Clock) -> Outcome:
         now = clock.monotonic
         machine = bench.machine(now())
         machine.confirm(typed)

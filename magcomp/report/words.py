@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from magcomp import autopilots
 from magcomp.model import Vehicle, quantity_of
+from magcomp.sweeping.steps import Step
 
 _MOST_DECIMALS = 3
 
@@ -115,4 +116,19 @@ def sentence(text: str) -> str:
 
 def printable(name: str) -> str:
     """A file's name without what a terminal would obey."""
+    if name.isprintable():
+        return name
     return "".join(c if c.isprintable() else "?" for c in name)
+
+
+def sweep_step(step: Step) -> str:
+    """``motor 2 at 30%`` or ``all 4 motors at 30%``.
+
+    Examples
+    --------
+    >>> sweep_step(Step(motors=(2,), share=0.3))
+    'motor 2 at 30%'
+    """
+    single = len(step.motors) == 1
+    which = f"motor {step.motors[0]}" if single else f"all {len(step.motors)} motors"
+    return f"{which} at {step.share:.0%}"

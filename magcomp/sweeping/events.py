@@ -31,6 +31,7 @@ class Reason(Enum):
     REFUSED = "the vehicle refused"
     UNANSWERED = "the vehicle did not answer"
     NO_CURRENT = "the current is not told"
+    DEAF = "the screen takes no key any more"
     ERROR = "an error in the program"
 
 

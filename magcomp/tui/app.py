@@ -11,11 +11,12 @@ from typing import Any, ClassVar
 from rich.text import Text
 from textual.app import SystemCommand
 from textual.binding import Binding, BindingType
+from textual.events import Event, Key
 from textual.screen import Screen
 
 from magcomp.errors import MagcompError, UsageError
 from magcomp.model import Grade
-from magcomp.tui import fitting, opening, status, verifying, writing
+from magcomp.tui import fitting, opening, status, sweeping, verifying, writing
 from magcomp.tui.base import BaseApp
 from magcomp.tui.help_text import help_text, key_lines
 from magcomp.tui.messages import (
@@ -24,6 +25,7 @@ from magcomp.tui.messages import (
     PortsWanted,
     SnapshotTaken,
     StateWanted,
+    SweepTold,
     TargetChosen,
     TimeRangeWanted,
     WatchingFailed,
@@ -33,6 +35,7 @@ from magcomp.tui.screens.dialogs import Help, Message, Quit
 from magcomp.tui.screens.fit import FitScreen
 from magcomp.tui.screens.record import RecordScreen
 from magcomp.tui.screens.review import ReviewScreen
+from magcomp.tui.screens.sweeping import Sweeping
 from magcomp.tui.screens.verify import VerifyScreen
 from magcomp.tui.settings import Settings, write_template
 from magcomp.tui.state import Busy
@@ -109,6 +112,18 @@ class MagcompApp(BaseApp):
             verifying.watch_flight(self)
             self.redraw()
 
+    def on_sweep_told(self, message: SweepTold) -> None:
+        """Show how a sweep goes on."""
+        if isinstance(self.screen, Sweeping):
+            self.screen.tell(message.event)
+
+    async def on_event(self, event: Event) -> None:
+        """While motors spin each key stops them, before it does anything else."""
+        if isinstance(event, Key) and isinstance(self.screen, Sweeping):
+            self.screen.stop.set()
+            return
+        await super().on_event(event)
+
     def on_watching_failed(self, message: WatchingFailed) -> None:
         """Say why the vehicle is followed no more."""
         self.complain(message.error)
@@ -156,6 +171,7 @@ class MagcompApp(BaseApp):
             "simulate": not work.source,
             "manoeuvre": work.live,
             "write": work.live,
+            "sweep": work.live,
             "fly_again": self.simulation is not None and bool(self.writing.in_force),
             "undo": bool(self.writing.in_force),
         }
@@ -186,6 +202,10 @@ class MagcompApp(BaseApp):
     def action_other_fit(self) -> None:
         """Show another one of the fits tried."""
         fitting.show_other(self)
+
+    def action_sweep(self) -> None:
+        """Spin the motors on the ground, after the vehicle's name was typed."""
+        sweeping.ask(self)
 
     def action_write(self) -> None:
         """Write to the vehicle."""
@@ -263,6 +283,7 @@ class MagcompApp(BaseApp):
             "How it is moved", "Flown, on a stand, tied down", self.action_manoeuvre
         )
         yield SystemCommand("Fit again", "What is recorded so far", self.action_fit)
+        yield SystemCommand("Sweep on the ground", "The motors spin", self.action_sweep)
         yield SystemCommand("Write to vehicle", "After a question", self.action_write)
         yield SystemCommand("Save parameter file", "For a ground station", self.action_save)
         yield SystemCommand("Save report", "As a page, text or JSON", self.action_report)

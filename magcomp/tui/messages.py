@@ -8,6 +8,7 @@ from typing import Any
 from textual.message import Message
 
 from magcomp.live.snapshot import LiveSnapshot
+from magcomp.sweeping.events import Event
 
 
 class StateWanted(Message):
@@ -80,6 +81,20 @@ class SnapshotTaken(Message):
     def can_replace(self, message: Message) -> bool:
         """A screen that is slow shows fewer snapshots, never old ones."""
         return isinstance(message, SnapshotTaken)
+
+
+class SweepTold(Message):
+    """Something happened in a sweep, from the thread that carries it out, which never waits.
+
+    Parameters
+    ----------
+    event
+        What.
+    """
+
+    def __init__(self, event: Event) -> None:
+        super().__init__()
+        self.event = event
 
 
 class WatchingFailed(Message):

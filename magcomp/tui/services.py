@@ -8,18 +8,24 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 from magcomp.analysis import Options, analyse, check
 from magcomp.errors import LinkError, MagcompError, UsageError
-from magcomp.link import SerialPort, serial_ports
+from magcomp.link import Connection, SerialPort, serial_ports
+from magcomp.link.clock import Clock
+from magcomp.live.latest import Latest
 from magcomp.live.situation import Manoeuvre
 from magcomp.live.snapshot import LiveSnapshot
+from magcomp.live.sweep import Bench, make_ready, sweep
 from magcomp.live.upload import new_file
 from magcomp.model import Analysis, ParameterSet, Recording, Vehicle, Verdict
 from magcomp.report.evidence import compass_plots
 from magcomp.report.files import report_text, write_text
 from magcomp.sources import read
+from magcomp.sweeping.events import Event as SweepEvent
+from magcomp.sweeping.events import Outcome as SweepOutcome
+from magcomp.sweeping.events import Reason
 from magcomp.tui.pictures import CompassPicture, picture
 from magcomp.writing.events import Event, Outcome
 from magcomp.writing.journal import journal_path
@@ -27,6 +33,14 @@ from magcomp.writing.plan import WritePlan
 
 Progress = Callable[[str, float], None]
 """What is being done, and the share done, 0 … 1."""
+
+_Result = TypeVar("_Result")
+
+Pressed = Callable[[], Reason | None]
+"""Whether somebody wants a sweep to stop, and why."""
+
+SweepTold = Callable[[SweepEvent], None]
+"""Told what happens in a sweep."""
 
 _SERVE_S = 10.0
 
@@ -77,6 +91,10 @@ class Session(Protocol):
         stop: Callable[[], bool],
     ) -> Outcome:
         """Write what `restore_plan` made."""
+        ...
+
+    def alone(self, work: Callable[[Connection, Vehicle, Latest, Clock], _Result]) -> _Result:
+        """Let somebody speak with the vehicle while nobody else does."""
         ...
 
     def close(self) -> None:
@@ -174,6 +192,8 @@ class Services:
         A session with the vehicle at an address, that records into a file.
     simulate
         Starts a simulated vehicle.
+    make_ready, sweep
+        Look whether a vehicle's motors can be spun on the ground, and spin them.
     now
         The time, for names of files.
     folder
@@ -184,6 +204,8 @@ class Services:
     read: Callable[[Path, int | None], Recording] = read_log
     open_live: Callable[[str, Path, int | None], Session] = open_live
     simulate: Callable[[], Simulation] = simulate
+    make_ready: Callable[[Session, int | None, float], Bench] = make_ready
+    sweep: Callable[[Session, Bench, str, Pressed, SweepTold], SweepOutcome] = sweep
     now: Callable[[], datetime] = _now
     folder: Path | None = field(default=None)
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from scipy import special
 
-from magcomp.fleet.pooled import SURE, chances_apart, change, pool
+from magcomp.fleet.pooled import SURE, chances_apart, change, distances, is_definite, pool
 
 TRUTH = np.array([-1.4, 0.8, -1.9])
 
@@ -90,3 +92,32 @@ def test_flights_of_one_moment_have_no_drift() -> None:
     motors, covariances = flights(np.random.default_rng(6), 3, 5.0)
     assert change(np.zeros(3), motors, covariances) is None
     assert change(np.full(3, np.nan), motors, covariances) is None
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.integers(4, 60), st.floats(0.0, 1.0))
+def test_who_is_furthest_is_found_among_the_few_that_are_looked_at(
+    seed: int, count: int, far: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    motors, covariances = flights(rng, count)
+    motors[count // 2] += far
+    pooled = pool(motors, covariances)
+    chances, _ = chances_apart(motors, covariances, np.arange(count))
+    worst = int(np.argmin(chances))
+    if chances[worst] < SURE / count:
+        assert worst in np.argsort(distances(motors, covariances, pooled))[-6:]
+
+
+@given(st.lists(st.floats(-3.0, 3.0), min_size=6, max_size=6))
+def test_definite_is_what_the_eigenvalues_say(entries: list[float]) -> None:
+    xx, yy, zz, xy, xz, yz = entries
+    matrix = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    least = float(np.linalg.eigvalsh(matrix)[0])
+    if abs(least) > 1e-6:
+        assert is_definite(matrix[None])[0] == (least > 0.0)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, 1e200])
+def test_what_is_not_finite_is_not_definite(bad: float) -> None:
+    assert not is_definite(np.diag([bad, 1.0, bad])[None])[0]

@@ -38,7 +38,9 @@ class RecordScreen(StepScreen):
     HELP = """\
 **Recording.** Everything the vehicle says is written to the file as it arrives. Do what the *next*
 line says; it speaks of throttle only while the vehicle is held or tied down. When it says that it
-is enough, press N. You can fit at any time and come back: the recording goes on.
+is enough, press N. G sweeps a vehicle that stands on the ground: its motors spin, one by one and
+together, once you have typed its name. You can fit at any time and come back: the recording goes
+on.
 
 Whether the vehicle is flown, turned on a stand or tied down is found out. Where that goes wrong,
 press M to say it, once or more, until the *next* line names it.
@@ -47,6 +49,7 @@ press M to say it, once or more, until the *next* line names it.
         Binding("n", "app.forward", "Fit", id="go.next"),
         Binding("m", "app.manoeuvre", "How", id="record.manoeuvre"),
         Binding("b", "app.backward", "Back", id="go.back"),
+        Binding("g", "app.sweep", "Sweep", id="record.sweep"),
         Binding("x", "app.disconnect", "Disconnect", id="connect.close"),
     ]
 
