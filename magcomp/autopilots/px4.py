@@ -42,6 +42,7 @@ from magcomp.autopilots.terms import (
     FieldMeaning,
     LagPrior,
     LagPriors,
+    MotorLaw,
     MotorOutputs,
     ParameterName,
     ThrustCurve,
@@ -114,6 +115,9 @@ class Px4:
     batteries = (0, 1)
     first_slot_leads = False
     first_compass_message = "SCALED_IMU"
+    offset_decimals = 4
+    corrected_message = "HIGHRES_IMU"
+    corrected_unit = MGAUSS
     storage_s = 2.5  # it saves all at once, 0.3 s after a change and not again for 2 s
     motor_test = Px4MotorTest()
     device_ids_describe = "bus, address and type of a sensor, which are alike in vehicles of a kind"
@@ -257,6 +261,22 @@ class Px4:
             found |= _vector("SCALE", compass, made.scale)
             found |= _vector("ODIAG", compass, made.off_diagonal)
         return found
+
+    def motor_law(self, compass: int, values: Mapping[str, float]) -> MotorLaw | None:  # noqa: ARG002
+        """None: PX4 multiplies one quantity for all motors."""
+        return None
+
+    def per_motor_parameters(
+        self,
+        correction: Correction,  # noqa: ARG002
+        exponent: float,  # noqa: ARG002
+        compass: int,  # noqa: ARG002
+        values: Mapping[str, float],  # noqa: ARG002
+        *,
+        soft_iron_fitted: bool,  # noqa: ARG002
+    ) -> dict[str, float]:
+        """None, as there is no such law."""
+        return {}
 
     def switch_parameters(
         self,

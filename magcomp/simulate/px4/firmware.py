@@ -115,6 +115,10 @@ class Px4:
         self._talker.take_mode(mode)
         self._talker.arm()
 
+    def hold(self, name: str, value: float) -> None:
+        """Set a parameter as from the vehicle's own console."""
+        self._parameters.set(name, value, 0.0)
+
     def reboot(self, time: float) -> None:
         """Forget all but what is saved."""
         self._parameters.settle(time)
