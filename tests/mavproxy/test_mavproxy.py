@@ -128,7 +128,7 @@ def test_a_flight_is_fitted_written_and_undone(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     with (
-        alive("sweep", speed=10.0, wait_for_ground=True) as flown,
+        alive("sweep", speed=4.0, wait_for_ground=True) as flown,
         FakeMavproxy(flown.address).running() as mavproxy,
     ):
         prompt = Prompt(mavproxy, capsys)
@@ -142,7 +142,7 @@ def test_a_flight_is_fitted_written_and_undone(
         wanted = read_parameter_file(tmp_path / "a.parm").values
         assert "Nothing is written yet: magcomp write yes" in prompt("magcomp write")
         assert held(flown.vehicle) == before
-        assert "To undo this: magcomp undo" in prompt.until("magcomp write yes", "Written and read")
+        assert "To undo this: magcomp undo" in prompt("magcomp write yes")
         assert flown.vehicle.parameters["COMPASS_MOT_X"] == wanted["COMPASS_MOT_X"]
         assert "nothing is written" in prompt("magcomp write yes")
         assert "magcomp undo yes" in prompt("magcomp undo")
