@@ -137,11 +137,13 @@ class Bench:
         most: float = 0.5,
         warm_up_s: float = WARM_UP_S,
         faults: Faults | None = None,
+        autopilot: str = "ardupilot",
     ) -> None:
         chosen = scenario(name, seed)
         if program is not None:
             chosen = Scenario(chosen.truth, lambda: program, chosen.mode)
-        self.vehicle = Vehicle(chosen)
+        self.known = Known(autopilot, "copter", 1, 1)
+        self.vehicle = Vehicle(chosen, autopilot=autopilot)
         self.cable = Cable(self.vehicle)
         between = self.cable if faults is None else FaultyLink(self.cable, faults, seed)
         self.link = LocalConnection(between)
@@ -152,7 +154,12 @@ class Bench:
             self.link = LocalConnection(between, self.vehicle.time)
         self.hear(WARM_UP_S)
         self.machine = SweepSequence(
-            name_of(KNOWN), MOTOR_TEST, 4, most, now=self.now, limits=LIMITS
+            name_of(self.known),
+            autopilots.of(self.known).motor_test,
+            4,
+            most,
+            now=self.now,
+            limits=LIMITS,
         )
         self.events: list[tuple[float, Event]] = []
 
@@ -176,7 +183,7 @@ class Bench:
         return carry_out(
             self.machine,
             self.link,
-            KNOWN,
+            self.known,
             clock=self.link.clock,
             pressed=lambda: befalls(self),
             on_event=lambda event: self.events.append((self.now, event)),

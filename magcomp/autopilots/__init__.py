@@ -57,6 +57,11 @@ def parse(name: str) -> ParameterName | None:
     return next((found for each in ALL if (found := each.parse(name)) is not None), None)
 
 
+def offset_decimals(name: str) -> int:
+    """So many decimals of an offset of any firmware are finer than a heading can tell."""
+    return next((each.offset_decimals for each in ALL if each.parse(name) is not None), 2)
+
+
 def integer_type(name: str) -> int | None:
     """MAV_PARAM_TYPE of a compass parameter of any firmware that holds whole numbers, else None."""
     return next((kind for each in ALL if (kind := each.integer_type(name)) is not None), None)

@@ -48,6 +48,11 @@ class MotorTest(Protocol):
         ...
 
     @property
+    def count_name(self) -> str:
+        """Parameter that tells the number of motors; empty where only the outputs do."""
+        ...
+
+    @property
     def refused_hint(self) -> str:
         """What to look for where it refuses; a clause."""
         ...
@@ -77,6 +82,7 @@ class ArduPilotMotorTest:
     number = 209
     looks_armed = True
     longest_s = 600.0
+    count_name = ""
     refused_hint = "is it landed, the safety switch pressed, and its radio control calibrated?"
 
     def spin(self, motor: int, share: float, seconds: float) -> Command:
@@ -101,6 +107,7 @@ class Px4MotorTest:
     number = 310
     looks_armed = False
     longest_s = 3.0
+    count_name = "CA_ROTOR_COUNT"
     refused_hint = "is it disarmed, its safety off, and COM_MOT_TEST_EN 1?"
 
     def spin(self, motor: int, share: float, seconds: float) -> Command:

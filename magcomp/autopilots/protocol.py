@@ -92,6 +92,24 @@ class Autopilot(Protocol):
         ...
 
     @property
+    def offset_decimals(self) -> int:
+        """So many decimals of an offset are finer than a heading can tell."""
+        ...
+
+    @property
+    def corrected_message(self) -> str | None:
+        """Telemetry message with what the firmware makes of the compass it uses, in body axes.
+
+        None where the compasses' own messages say it.
+        """
+        ...
+
+    @property
+    def corrected_unit(self) -> float:
+        """MGauss of one in that message."""
+        ...
+
+    @property
     def storage_s(self) -> float:
         """Seconds after which a write survives a restart."""
         ...

@@ -114,6 +114,9 @@ class Px4:
     batteries = (0, 1)
     first_slot_leads = False
     first_compass_message = "SCALED_IMU"
+    offset_decimals = 4
+    corrected_message = "HIGHRES_IMU"
+    corrected_unit = MGAUSS
     storage_s = 2.5  # it saves all at once, 0.3 s after a change and not again for 2 s
     motor_test = Px4MotorTest()
     device_ids_describe = "bus, address and type of a sensor, which are alike in vehicles of a kind"
@@ -283,8 +286,8 @@ class Px4:
         return px4_settings.relevant_names()
 
     def useful_names(self) -> tuple[str, ...]:
-        """How the board and the compasses are turned, and the thrust curve."""
-        return (*px4_settings.turning_names(), _THRUST_CURVE)
+        """How the board and the compasses are turned, the thrust curve, the number of motors."""
+        return (*px4_settings.turning_names(), _THRUST_CURVE, self.motor_test.count_name)
 
     def output_names(self) -> tuple[str, ...]:
         """None: the log says by itself which outputs are motors."""

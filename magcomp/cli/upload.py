@@ -24,6 +24,7 @@ from magcomp.cli.writing import (
     agreed,
     carry_out,
     need_consent,
+    say_what_acts,
     say_what_is_held,
     show_difference,
 )
@@ -197,6 +198,7 @@ class VehicleLink:
                 stop,
             )
         if code is ExitCode.GOOD:
+            say_what_acts(plan, self.connection)
             complain(f"To undo this:\n  {restore_command(backup, *reach)}")
         return code, plan
 

@@ -21,7 +21,7 @@ from magcomp.cli.linking import (
 )
 from magcomp.cli.options import check_output, json_option
 from magcomp.cli.output import answer, complain, look, progress
-from magcomp.cli.writing import agreed, carry_out, need_consent, show_difference
+from magcomp.cli.writing import agreed, carry_out, need_consent, say_what_acts, show_difference
 from magcomp.errors import ExitCode, InputError
 from magcomp.live.session import LiveSession
 from magcomp.live.upload import DISARM_S, new_file
@@ -196,5 +196,6 @@ def _upload(
             stop,
         )
     if code is ExitCode.GOOD:
+        say_what_acts(plan, session.connection)
         complain(f"To undo this:\n  {restore_command(backup, *reach)}")
     return code

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import threading
+import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,7 +13,8 @@ import click
 
 from magcomp.cli.linking import StatusLine
 from magcomp.cli.output import answer, complain, look
-from magcomp.errors import ExitCode, MagcompError, UsageError
+from magcomp.errors import ExitCode, LinkError, LinkTimeoutError, MagcompError, UsageError
+from magcomp.link import Connection
 from magcomp.writing.events import (
     Event,
     Mismatch,
@@ -25,6 +27,7 @@ from magcomp.writing.events import (
 )
 from magcomp.writing.files import format_value
 from magcomp.writing.holding import holding
+from magcomp.writing.in_force import in_force_sentence
 from magcomp.writing.plan import WritePlan
 from magcomp.writing.writer import raise_for_failure
 
@@ -99,6 +102,17 @@ def say_what_is_held(plan: WritePlan, *, after: bool) -> None:
     """Say in a line what the vehicle holds, before or after a write."""
     values = {**plan.old, **plan.new, **plan.switches} if after else plan.old
     complain(f"The vehicle holds: {holding(plan.vehicle, values)}")
+
+
+def say_what_acts(plan: WritePlan, connection: Connection) -> None:
+    """Say whether what was written is in force, as far as the vehicle shows it."""
+    try:
+        sentence = in_force_sentence(connection, plan, time.monotonic, connection.requested_rates)
+    except (LinkError, LinkTimeoutError) as error:
+        complain(f"What is in force could not be looked at: {error}")
+        return
+    if sentence:
+        complain(f"{sentence[:1].upper()}{sentence[1:]}")
 
 
 def agreed(count: int, *, yes: bool) -> bool:

@@ -12,6 +12,7 @@ from typing import Any
 from magcomp.errors import OutputError
 from magcomp.fleet.row import VECTORS
 from magcomp.fleet.store import arrow
+from magcomp.report import words
 from magcomp.report.files import write_text
 
 SUFFIXES = (".csv", ".parquet")
@@ -92,5 +93,5 @@ def cell(value: object) -> object:
         return value if math.isfinite(value) else ""
     if not isinstance(value, str):
         return value
-    clean = "; ".join("".join(c if c.isprintable() else "?" for c in s) for s in value.split("\n"))
+    clean = "; ".join(words.printable(line) for line in value.split("\n"))
     return f"'{clean}" if clean.lstrip().startswith(_FORMULA) else clean

@@ -147,15 +147,17 @@ def motor_count(recording: Recording) -> int:
     MissingDataError
         Neither says.
     """
-    outputs = recording.outputs
+    autopilot, outputs = autopilots.of(recording), recording.outputs
+    counted = recording.parameters.last(autopilot.motor_test.count_name, 0.0)
+    if counted > 0.0:
+        return int(counted)
     motors = None
-    if outputs is not None and len(outputs):
-        width = outputs.value.shape[1]
-        motors = autopilots.of(recording).motor_outputs(recording.parameters, width)
+    if outputs is not None and len(outputs) and not autopilot.motor_test.count_name:
+        motors = autopilot.motor_outputs(recording.parameters, outputs.value.shape[1])
     if outputs is None or motors is None:
         raise MissingDataError(
-            f"{recording.source} must tell the motors' outputs (SERVO_OUTPUT_RAW); instead it "
-            "tells none. Give their number with --motors"
+            f"{recording.source} must tell how many motors there are; instead neither outputs nor "
+            "parameters do. Give their number with --motors"
         )
     return sum(bool(outputs.value[:, channel].any()) for channel in motors.channels)
 

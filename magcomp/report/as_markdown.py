@@ -144,9 +144,11 @@ def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
 def _with_code(text: str) -> str:
     """Text of which only what stands between backticks is Markdown."""
     parts = text.split("`")
-    return "`".join(part if k % 2 else _plain(part) for k, part in enumerate(parts))
+    return "`".join(
+        words.printable(part) if k % 2 else _plain(part) for k, part in enumerate(parts)
+    )
 
 
 def _plain(text: str) -> str:
-    """Text without meaning to Markdown."""
-    return text.translate(_SPECIAL)
+    """Text without meaning to Markdown, on one line whatever a log said in it."""
+    return words.printable(text).translate(_SPECIAL)

@@ -6,6 +6,7 @@ Everything here comes from templates that escape what they are given; what is HT
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -21,6 +22,17 @@ Key = tuple[str | int, ...]
 DASH = "–"
 
 
+_CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u202a-\u202e\u2066-\u2069]")
+"""What steers a screen or turns the direction of writing; not the tab and the line feed."""
+
+
+def _without_control(value: Any) -> Any:
+    """What a template prints, without what a log may have said to steer the screen."""
+    if not isinstance(value, str) or not _CONTROL.search(value):
+        return value
+    return type(value)(_CONTROL.sub("?", value))
+
+
 @cache
 def templates(package: str = "magcomp.report") -> Environment:
     """The templates of a package, and with them those that all pages are made of."""
@@ -28,6 +40,7 @@ def templates(package: str = "magcomp.report") -> Environment:
     environment = Environment(
         loader=ChoiceLoader([PackageLoader(each) for each in packages]),
         autoescape=True,
+        finalize=_without_control,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,

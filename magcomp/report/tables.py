@@ -16,7 +16,7 @@ from magcomp.model import CompassResult, MotorFit, Verdict, quantity_of
 from magcomp.report import words
 from magcomp.report.by_width import ByWidth
 
-_DECIMALS = {Kind.OFFSET: 2, Kind.DIAGONAL: 4, Kind.OFF_DIAGONAL: 4}
+_DECIMALS = {Kind.DIAGONAL: 4, Kind.OFF_DIAGONAL: 4}
 
 
 _NAMES, _COLUMN = 25, 17
@@ -178,6 +178,8 @@ def _same(new: float, old: float) -> bool:
 def _change(name: str, new: float, old: float) -> Text:
     parsed = autopilots.parse(name)
     decimals = 3 if parsed is None else _DECIMALS.get(parsed.kind, 3)
+    if parsed is not None and parsed.kind is Kind.OFFSET:
+        decimals = autopilots.offset_decimals(name)
     if _same(new, old):
         return Text(words.number(new, decimals), style="dim")
     text = Text()

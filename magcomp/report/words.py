@@ -106,16 +106,17 @@ def vehicle(of: Vehicle) -> str:
     """``ArduPilot copter 4.6.3, system 1``."""
     known = "" if of.kind == "unknown" else of.kind
     words = [autopilots.title(of.autopilot), known, of.firmware]
-    return f"{' '.join(filter(None, words))}, system {of.system}"
+    return printable(f"{' '.join(filter(None, words))}, system {of.system}")
 
 
 def sentence(text: str) -> str:
-    """A reason with a capital letter and a full stop."""
+    """A reason with a capital letter and a full stop, on one line whatever a log said in it."""
+    text = printable(text)
     return f"{text[:1].upper()}{text[1:]}".rstrip(".") + "."
 
 
 def printable(name: str) -> str:
-    """A file's name without what a terminal would obey."""
+    """A log's words, or its name, without what a terminal would obey."""
     if name.isprintable():
         return name
     return "".join(c if c.isprintable() else "?" for c in name)

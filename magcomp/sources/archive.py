@@ -100,6 +100,8 @@ def _unzip(
     head_size: int,
     limit: int,
 ) -> None:
+    if not all(info.filename for info in archive.infolist()):
+        raise zipfile.BadZipFile("a file in it has no name")
     files = [info for info in archive.infolist() if not info.is_dir()]
     if len(files) > MOST_FILES:
         raise LogError(

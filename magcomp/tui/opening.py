@@ -93,7 +93,8 @@ def leave(app: BaseApp) -> None:
 def next_manoeuvre(app: BaseApp) -> None:
     """Take the next of the ways to move a vehicle as said; after the last it is found out again."""
     if app.session is not None:
-        ways = (None, *Manoeuvre)
+        # The one that is safe in the air comes first, should the key be pressed there.
+        ways = (None, Manoeuvre.FLIGHT, Manoeuvre.STAND, Manoeuvre.SWEEP)
         app.session.manoeuvre = ways[(ways.index(app.session.manoeuvre) + 1) % len(ways)]
         app.redraw()
 

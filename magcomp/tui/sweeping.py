@@ -21,10 +21,10 @@ DEAF_S = 2.0
 """A screen that draws nothing for so long takes no key either: the sweep stops."""
 
 _DEFAULT_MOST = 0.5
-_WARNING = """\
-The motors will spin, each alone and all together. Take the propellers off, or hold the vehicle down
-so that it cannot move or tilt. Any key stops at once.\
-"""
+_WARNING = (
+    "The motors will spin, each alone and all together. Take the propellers off, or hold the "
+    "vehicle down so that it cannot move or tilt. Any key stops at once."
+)
 
 
 def ask(app: BaseApp) -> None:
@@ -45,8 +45,8 @@ def _ask_name(app: BaseApp, bench: Bench) -> None:
         "Sweep on the ground",
         _WARNING,
         (
-            ("Strongest step, % of the motor outputs' range", f"{100 * bench.most:.0f}"),
             (f"Type {bench.name} to begin", ""),
+            ("Strongest step, % of the motor outputs' range", f"{100 * bench.most:.0f}"),
         ),
         check=partial(_fault, bench),
     )
@@ -54,18 +54,18 @@ def _ask_name(app: BaseApp, bench: Bench) -> None:
 
 
 def _fault(bench: Bench, answer: tuple[str, ...]) -> Fault | None:
-    """What is wrong with a strongest step and a name."""
+    """What is wrong with a name and a strongest step."""
+    if not bench.is_name(answer[0]):
+        told = f"What is typed must be {bench.name}; instead received {answer[0]!r}"
+        return Fault(0, f"{told}, and no motor spins.")
     least, most = 100 * LEAST_MOST, 100 * MOST_MOST
     try:
-        share = float(answer[0])
+        share = float(answer[1])
     except ValueError:
         share = 0.0
     if not least <= share <= most:
         told = f"The strongest step must be {least:.0f} to {most:.0f} %"
-        return Fault(0, f"{told}; instead received {answer[0]!r}.")
-    if not bench.is_name(answer[1]):
-        told = f"What is typed must be {bench.name}; instead received {answer[1]!r}"
-        return Fault(1, f"{told}, and no motor spins.")
+        return Fault(1, f"{told}; instead received {answer[1]!r}.")
     return None
 
 
@@ -73,7 +73,7 @@ def _begin(app: BaseApp, bench: Bench, answer: tuple[str, ...]) -> None:
     session, screen = app.session, Sweeping()
     if session is None:
         return
-    chosen = replace(bench, most=float(answer[0]) / 100)
+    chosen = replace(bench, most=float(answer[1]) / 100)
 
     def pressed() -> Reason | None:
         if app.stopping.is_set() or not app.is_running:
@@ -89,7 +89,7 @@ def _begin(app: BaseApp, bench: Bench, answer: tuple[str, ...]) -> None:
     def work() -> tuple[Outcome, float]:
         begun = session.recording().duration_s
         try:
-            return app.services.sweep(session, chosen, answer[1], pressed, tell), begun
+            return app.services.sweep(session, chosen, answer[0], pressed, tell), begun
         finally:
             app.call_from_thread(_close, app, screen)
 

@@ -58,7 +58,7 @@ async def test_any_key_stops(tmp_path, monkeypatch, key):
     sweep = Spinning()
     async with on_the_ground(tmp_path, sweep).run_test() as pilot:
         await asked(pilot)
-        await press(pilot, "tab", *NAME)
+        await press(pilot, *NAME)
         await pilot.press("enter")
         await until(pilot, lambda: "all 4 motors at 50%" in screen(pilot.app))
         shown = screen(pilot.app)
@@ -75,7 +75,7 @@ async def test_a_screen_that_takes_no_key_any_more_stops_too(tmp_path, monkeypat
     async with on_the_ground(tmp_path, sweep).run_test() as pilot:
         await asked(pilot)
         monkeypatch.setattr(Sweeping, "silent_s", sweeping.DEAF_S + 1.0)
-        await press(pilot, "tab", *NAME, "enter")
+        await press(pilot, *NAME, "enter")
         await until(pilot, lambda: isinstance(pilot.app.screen, Message))
         assert "the screen takes no key any more" in screen(pilot.app)
 
@@ -84,9 +84,9 @@ async def test_another_name_and_another_strength_are_refused_where_they_stand(tm
     sweep = Spinning()
     async with on_the_ground(tmp_path, sweep).run_test() as pilot:
         await asked(pilot)
-        await press(pilot, "tab", *"yes", "enter")
+        await press(pilot, *"yes", "enter")
         await until(pilot, lambda: "instead received 'yes'" in screen(pilot.app))
-        await press(pilot, "shift+tab", *"95", "enter")
+        await press(pilot, "ctrl+u", *NAME, "tab", *"95", "enter")
         await until(pilot, lambda: "must be 10 to 90 %" in screen(pilot.app))
         await press(pilot, "escape")
         await until(pilot, lambda: not isinstance(pilot.app.screen, AskText))
@@ -102,7 +102,7 @@ async def test_a_whole_sweep_goes_on_to_its_fit(tmp_path, monkeypatch):
 
     async with on_the_ground(tmp_path, sweep).run_test() as pilot:
         await asked(pilot)
-        await press(pilot, "tab", *NAME, "enter")
+        await press(pilot, *NAME, "enter")
         await until(pilot, lambda: fitted)
         assert pilot.app.current_mode == "fit"
     assert (fitted[0].method, fitted[0].regressor) == ("sweep", "current")
@@ -115,7 +115,7 @@ async def test_what_stopped_it_is_said(tmp_path, reason):
 
     async with on_the_ground(tmp_path, sweep).run_test() as pilot:
         await asked(pilot)
-        await press(pilot, "tab", *NAME, "enter")
+        await press(pilot, *NAME, "enter")
         await until(pilot, lambda: isinstance(pilot.app.screen, Message))
         assert "The sweep was stopped because the vehicle tilted by 8°" in screen(pilot.app)
         assert not any(isinstance(each, Sweeping) for each in pilot.app.screen_stack)

@@ -24,6 +24,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from magcomp.mavlink.parameters import NO_INDEX, Encoding, as_float, decode_values, encode_value
 from magcomp.simulate.habits import BOARD_VERSION, Habits
+from magcomp.simulate.px4.actuator_test import ActuatorTest
 from magcomp.simulate.px4.parameters import Parameters
 from magcomp.simulate.px4.streams import DEFAULT_RATES, TELEMETRY
 from magcomp.simulate.talker import Talker
@@ -78,6 +79,7 @@ class Px4Talker(Talker):
         """Forget what a reboot forgets, and begin to send what is sent unasked."""
         self.forget()
         self.mode = _POSITION
+        self.actuator_test = ActuatorTest()
         self._list: deque[str] = deque()
         self._changed: deque[str] = deque()
         self._told = self._parameters.version
@@ -97,6 +99,7 @@ class Px4Talker(Talker):
     def send_paced(self, now_s: float) -> None:
         """Save and send the next few parameters; called every 10 ms, in seconds since power-up."""
         self._now_s = now_s
+        self.actuator_test.advance(now_s)
         parameters = self._parameters
         parameters.settle(now_s)
         if parameters.version != self._told:
@@ -111,6 +114,7 @@ class Px4Talker(Talker):
     def arm(self, *, force: bool = False) -> bool:  # noqa: ARG002
         """Arm; nothing is in the way here."""
         if not self.armed:
+            self.actuator_test = ActuatorTest()
             self.say("Armed by external command")
             self.armed = True
         return True
@@ -266,6 +270,14 @@ class Px4Talker(Talker):
         failed = result == mavlink.MAV_RESULT_FAILED
         return int(mavlink.MAV_RESULT_TEMPORARILY_REJECTED) if failed else result
 
+    def _test_actuator(self, message: Any, now_ms: int) -> int:  # noqa: ARG002
+        if self.armed or not self._parameters.values["COM_MOT_TEST_EN"]:
+            return int(mavlink.MAV_RESULT_DENIED)
+        function = message.param5 if message.get_type() == "COMMAND_LONG" else message.x
+        value, seconds = message.param1, message.param2
+        known = self.actuator_test.command(int(function), value, seconds, self._now_s)
+        return int(mavlink.MAV_RESULT_ACCEPTED if known else mavlink.MAV_RESULT_UNSUPPORTED)
+
     def _reboot(self, message: Any, now_ms: int) -> int:  # noqa: ARG002
         if self.armed or message.param1 != 1.0:
             return int(mavlink.MAV_RESULT_DENIED)
@@ -288,4 +300,5 @@ class Px4Talker(Talker):
         mavlink.MAV_CMD_REQUEST_MESSAGE: _request_message,
         mavlink.MAV_CMD_COMPONENT_ARM_DISARM: _arm_or_disarm,
         mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: _reboot,
+        mavlink.MAV_CMD_ACTUATOR_TEST: _test_actuator,
     }

@@ -148,7 +148,7 @@ class Compasses:
         calibration = self._in_force[self.used]
         learned = np.linalg.solve(calibration.soft_iron, self._turns[self.used].T @ self.bias)
         kept = replace(calibration, offset=calibration.offset + _FOLDED * learned)
-        self.bias = self.bias * (1.0 - _FOLDED)
+        self.bias = np.zeros(3)  # the estimator begins anew with a new calibration
         self._in_force[self.used] = kept
         for kind, vector in (
             ("OFF", kept.offset),
@@ -173,7 +173,12 @@ class Compasses:
                 self._in_force[index] = replace(AT_START, compensation=switch)
                 urgencies.append(_INTERNAL_URGENCY)
                 continue
-            self._in_force[index] = taken_over(self._in_force[index], stored(values, slot), zone)
+            before = self._in_force[index]
+            self._in_force[index] = taken_over(before, stored(values, slot), zone)
+            if index == self.used and not np.array_equal(
+                before.offset, self._in_force[index].offset
+            ):
+                self.bias = np.zeros(3)
             self._turns[index] = sensor_to_body(values, slot)
             urgencies.append(values[single_name("PRIO", slot)] % (_MOST_URGENT + 1.0))
         self.used = int(np.argmax(urgencies))

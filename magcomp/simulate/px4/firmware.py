@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from magcomp.autopilots.px4_correction import Compensation
 from magcomp.earth import EarthField
@@ -21,6 +22,8 @@ from magcomp.simulate.px4.sensors import as_json
 from magcomp.simulate.px4.telemetry import Battery, View, build
 from magcomp.simulate.talker import Talker
 from magcomp.simulate.truth import Truth
+
+FloatArray = NDArray[np.float64]
 
 _HEARTBEAT_MS = 1000
 _MGAUSS = 1000.0
@@ -99,17 +102,22 @@ class Px4:
 
     @property
     def spinning(self) -> tuple[int, ...]:
-        """No motor by a test."""
-        return ()
+        """The motors that an actuator test drives at this moment, counted from 1."""
+        return tuple(np.flatnonzero(self._talker.actuator_test.thrust) + 1)
 
-    def tested(self) -> None:
-        """No motor test: what a ground station asks for is not supported."""
-        return
+    def tested(self) -> FloatArray | None:
+        """What an actuator test makes of each motor."""
+        test = self._talker.actuator_test
+        return test.thrust if test.running else None
 
     def fly(self, mode: int) -> None:
         """Take a flight mode and arm."""
         self._talker.take_mode(mode)
         self._talker.arm()
+
+    def hold(self, name: str, value: float) -> None:
+        """Set a parameter as from the vehicle's own console."""
+        self._parameters.set(name, value, 0.0)
 
     def reboot(self, time: float) -> None:
         """Forget all but what is saved."""
@@ -161,7 +169,7 @@ class Px4:
             raw=self._compasses.raw,
             field=self._compasses.corrected - self._compasses.bias,
             thrust=moment.throttle if self._talker.armed else 0.0,
-            armed=self._talker.armed,
+            armed=self._talker.armed or self._talker.actuator_test.running,
             battery=self._battery,
         )
 

@@ -1,0 +1,155 @@
+"""Whether what was written acts, where a vehicle says what it makes of its compass.
+
+docs/autopilots.md, PX4: in force. A firmware may hold a value and go on with another one. Some
+send both the sensor's own field and what they make of it, so that at rest the two tell.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from magcomp import autopilots
+from magcomp.model import FloatArray, Series, Vehicle
+from magcomp.writing.plan import WritePlan
+from magcomp.writing.writer import Connection, fetch
+
+_LOOK_S = 2.0
+_STEP_S = 0.1
+_HZ = 10.0
+_LEAST = 5
+_AGREES = 4.0
+"""mGauss: means of two seconds differ by a fraction of it, and by what is being drawn at rest."""
+
+_TOLD_APART = 2.0
+"""What was before must be this many times farther from what is seen."""
+
+
+@dataclass(frozen=True)
+class Seen:
+    """Means over a look at a vehicle at rest.
+
+    Attributes
+    ----------
+    raw
+        What each compass message holds, by message name, mGauss, shape (3,).
+    made
+        What the firmware makes of the compass it uses, body axes, mGauss, shape (3,).
+    """
+
+    raw: Mapping[str, FloatArray]
+    made: FloatArray
+
+
+def in_force_sentence(
+    connection: Connection,
+    plan: WritePlan,
+    clock: Callable[[], float],
+    streamed: Mapping[str, float] | None = None,
+) -> str:
+    """Look whether a write acts, and say it; empty where the firmware shows nothing of it.
+
+    Parameters
+    ----------
+    plan
+        What was written.
+    streamed
+        Messages that come already, by name; they are left as they are.
+
+    Raises
+    ------
+    LinkTimeoutError, LinkError
+        The vehicle does not answer, or the link is lost.
+    """
+    autopilot = autopilots.of(plan.vehicle)
+    message = autopilot.corrected_message
+    if message is None:
+        return ""
+    names = (*autopilot.relevant_names(), *autopilot.useful_names())
+    now = fetch(connection, plan.vehicle, names, clock=clock)
+    told = autopilot.compass_messages(now)
+    seen = _look(connection, plan.vehicle, (*told.values(), message), clock, streamed or {})
+    if seen is None:
+        return ""
+    return _sentence(plan.vehicle, seen, {**now, **plan.old}, now)
+
+
+def _sentence(
+    vehicle: Vehicle, seen: Seen, before: Mapping[str, float], now: Mapping[str, float]
+) -> str:
+    title = autopilots.of(vehicle).title
+    apart = [
+        (_apart(vehicle, seen, slot, now), _apart(vehicle, seen, slot, before))
+        for slot in autopilots.of(vehicle).compass_messages(now)
+    ]
+    new, old = min(apart, key=min)
+    if new <= _AGREES and old >= max(_TOLD_APART * new, _AGREES):
+        return (
+            f"{title} corrects its compass by what was written: within {new:.1f} mGauss; by what "
+            f"it held before it would be {old:.0f} off"
+        )
+    if old <= _AGREES and new > max(_TOLD_APART * old, _AGREES):
+        return (
+            f"{title} still corrects its compass by what it held before: restart the vehicle, and "
+            "it takes over what was written"
+        )
+    if new <= _AGREES:
+        return (
+            f"{title} corrects its compass as written, within {new:.1f} mGauss; without current "
+            "the new values make too little difference to be seen"
+        )
+    return (
+        f"what {title} has in force cannot be seen: its compass is {new:.0f} mGauss from what was "
+        f"written and {old:.0f} from what was before, because its estimator takes off what it has "
+        "learned; restart the vehicle to be sure"
+    )
+
+
+def _apart(vehicle: Vehicle, seen: Seen, slot: int, values: Mapping[str, float]) -> float:
+    """How far the firmware's field is from what given values would make of a compass, mGauss."""
+    autopilot = autopilots.of(vehicle)
+    said = Series(np.zeros(1), seen.raw[autopilot.compass_messages(values)[slot]][None])
+    fields, _ = autopilot.from_telemetry(dict.fromkeys(range(1, 4), said), values)
+    correction = autopilot.in_force(values, slot).correction
+    return float(np.linalg.norm(correction.apply(fields[slot].value, np.zeros(1))[0] - seen.made))
+
+
+def _look(
+    connection: Connection,
+    vehicle: Vehicle,
+    names: tuple[str, ...],
+    clock: Callable[[], float],
+    streamed: Mapping[str, float],
+) -> Seen | None:
+    """Ask for messages for a while, and give back what was sent before; None where few came."""
+    asked = [name for name in names if name not in streamed]
+    _ask(connection, vehicle, asked, 1e6 / _HZ)
+    heard: dict[str, list[tuple[float, float, float]]] = {name: [] for name in names}
+    until = clock() + _LOOK_S
+    while (left := until - clock()) > 0.0:
+        message = connection.receive(min(left, _STEP_S))
+        if message is not None and message.get_type() in heard:
+            heard[message.get_type()].append((message.xmag, message.ymag, message.zmag))
+    _ask(connection, vehicle, asked, 0.0)
+    if any(len(rows) < _LEAST for rows in heard.values()):
+        return None
+    *raw, made = names
+    return Seen(
+        {name: np.mean(heard[name], axis=0) for name in raw},
+        np.mean(heard[made], axis=0) * autopilots.of(vehicle).corrected_unit,
+    )
+
+
+def _ask(connection: Connection, vehicle: Vehicle, names: list[str], interval_us: float) -> None:
+    to = (vehicle.system, vehicle.component)
+    numbers = {each.msgname: number for number, each in mavlink.mavlink_map.items()}
+    for name in names:
+        rest = [0.0] * 5
+        connection.send(
+            mavlink.MAVLink_command_long_message(
+                *to, mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, 0, numbers[name], interval_us, *rest
+            )
+        )
