@@ -21,7 +21,6 @@ from magcomp.mavproxy.carried import CarriedTransport
 from magcomp.model import ParameterSet
 from magcomp.writing.files import read_parameter_file, write_parameter_file
 
-
 SPEED = 3.0
 """Beyond that pymavlink, which reads for MAVProxy, does not keep up on a busy machine."""
 
