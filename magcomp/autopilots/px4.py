@@ -42,6 +42,7 @@ from magcomp.autopilots.terms import (
     FieldMeaning,
     LagPrior,
     LagPriors,
+    MotorLaw,
     MotorOutputs,
     ParameterName,
     ThrustCurve,
@@ -256,6 +257,22 @@ class Px4:
             found |= _vector("SCALE", compass, made.scale)
             found |= _vector("ODIAG", compass, made.off_diagonal)
         return found
+
+    def motor_law(self, compass: int, values: Mapping[str, float]) -> MotorLaw | None:  # noqa: ARG002
+        """None: PX4 multiplies one quantity for all motors."""
+        return None
+
+    def per_motor_parameters(
+        self,
+        correction: Correction,  # noqa: ARG002
+        exponent: float,  # noqa: ARG002
+        compass: int,  # noqa: ARG002
+        values: Mapping[str, float],  # noqa: ARG002
+        *,
+        soft_iron_fitted: bool,  # noqa: ARG002
+    ) -> dict[str, float]:
+        """None, as there is no such law."""
+        return {}
 
     def switch_parameters(
         self,
