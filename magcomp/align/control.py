@@ -36,8 +36,11 @@ POWERS = (1, 2, 3)
 _LEAST_EXPLAINED = 0.8
 _FINER = 4.0
 _CUT_SHARE = 0.1
-_SMOOTHINGS = (0.03, 0.06, 0.1, 0.15, 0.2, 0.3)
-"""Time constants in seconds by which a battery monitor may smooth."""
+_SMOOTHINGS = (0.03, 0.06, 0.1, 0.15, 0.2, 0.3, 0.5)
+"""Time constants in seconds by which a battery monitor may smooth.
+
+PX4's telemetry does by 0.5 up to 1.15: docs/autopilots.md, PX4: link.
+"""
 _STEPS_SEEN = 1.5
 _CLEARLY_SMOOTHED = 0.9
 _MOST_ROWS = 1_000_000
