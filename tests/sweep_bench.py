@@ -28,8 +28,10 @@ LIMITS = Limits()
 
 _NUMBERS = {"RAW_IMU": 27, "SCALED_IMU2": 116, "SCALED_IMU3": 129, "ATTITUDE": 30, "VFR_HUD": 74}
 _NUMBERS |= {"BATTERY_STATUS": 147, "SERVO_OUTPUT_RAW": 36, "SYS_STATUS": 1}
-_NUMBERS |= {"GLOBAL_POSITION_INT": 33}
-RATES = {message: min(hertz, 10.0) for message, hertz in SWEEP_RATES.items()}
+_NUMBERS |= {"GLOBAL_POSITION_INT": 33, "SCALED_IMU": 26}
+_ARDUPILOT = {message: min(hertz, 10.0) for message, hertz in SWEEP_RATES.items()}
+_PX4 = {("SCALED_IMU" if each == "RAW_IMU" else each): hz for each, hz in SWEEP_RATES.items()}
+RATES = {"ardupilot": _ARDUPILOT, "px4": _PX4}
 """What a sweep asks for, as far as it tells anything new."""
 
 SLOW = {"ATTITUDE": 10.0, "BATTERY_STATUS": 10.0, "GLOBAL_POSITION_INT": 5.0}

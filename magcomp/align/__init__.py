@@ -2,11 +2,14 @@
 
 from magcomp.align.control import controls, reported
 from magcomp.align.expected import expected_earth, has_position
+from magcomp.align.motors import currents_of_motors, drive_of_motors, to_undo
 from magcomp.align.readings import readings, thinned, within
 from magcomp.align.sample import interpolate, sample
 
 __all__ = [
     "controls",
+    "currents_of_motors",
+    "drive_of_motors",
     "expected_earth",
     "has_position",
     "interpolate",
@@ -14,5 +17,6 @@ __all__ = [
     "reported",
     "sample",
     "thinned",
+    "to_undo",
     "within",
 ]

@@ -22,6 +22,7 @@ from magcomp.model import (
     CURRENT,
     SPEED_CONTROLLERS,
     THROTTLE,
+    BoolArray,
     Control,
     FloatArray,
     Recording,
@@ -31,22 +32,55 @@ from magcomp.model import (
 _SHIFTS = np.arange(-0.2, 0.301, 0.02)
 _TREND_S = 5.0
 _LEAST_ROWS = 30
+POWERS = (1, 2, 3)
 _LEAST_EXPLAINED = 0.8
 _FINER = 4.0
 _CUT_SHARE = 0.1
-_SMOOTHINGS = (0.03, 0.06, 0.1, 0.15, 0.2, 0.3)
-"""Time constants in seconds by which a battery monitor may smooth."""
+_SMOOTHINGS = (0.03, 0.06, 0.1, 0.15, 0.2, 0.3, 0.5)
+"""Time constants in seconds by which a battery monitor may smooth.
+
+PX4's telemetry does by 0.5 up to 1.15: docs/autopilots.md, PX4: link.
+"""
 _STEPS_SEEN = 1.5
 _CLEARLY_SMOOTHED = 0.9
 _MOST_ROWS = 1_000_000
 """More rows in even steps than this mean that the times are not to be trusted."""
 
 
-class _Rebuilt(NamedTuple):
-    """A form of a quantity, and the mean square it leaves of what was reported."""
+class Rebuilt(NamedTuple):
+    """A form of a quantity, and how it came about.
+
+    Attributes
+    ----------
+    control
+        The form.
+    cost
+        Mean square it leaves of what was reported.
+    coefficients
+        Of 1 and of the means of the duties' powers.
+    trend
+        What drifts slowly and was added, shape (n,).
+    """
 
     control: Control
     cost: float
+    coefficients: FloatArray
+    trend: FloatArray
+
+
+class Duty(NamedTuple):
+    """How hard each motor is driven.
+
+    Attributes
+    ----------
+    series
+        Duty 0 … 1, shape (n, k).
+    numbers
+        Of which motor each column is, as the firmware counts them.
+    """
+
+    series: Series
+    numbers: tuple[int, ...]
 
 
 def controls(recording: Recording) -> tuple[Control, ...]:
@@ -66,7 +100,7 @@ def controls(recording: Recording) -> tuple[Control, ...]:
         name = "the speed controllers' current" if of_escs else "battery current"
         found.append(Control(CURRENT, recording.current, name))
         rebuilt = [
-            _rebuilt(recording.current, features, CURRENT, f"{name}, rebuilt from the {source}")
+            rebuild(recording.current, features, CURRENT, f"{name}, rebuilt from the {source}")
             for features, source in _finer(recording, duty)
         ]
         found.extend(_best(rebuilt))
@@ -82,7 +116,7 @@ def controls(recording: Recording) -> tuple[Control, ...]:
                 )
             else:
                 name = "reported throttle, rebuilt from the motor outputs"
-                found.extend(_best([_rebuilt(throttle, duty, THROTTLE, name)]))
+                found.extend(_best([rebuild(throttle, duty, THROTTLE, name)]))
     return tuple(found)
 
 
@@ -108,12 +142,29 @@ def _duty(outputs: Series | None, motors: MotorOutputs | None) -> Series | None:
     """Duty 0 … 1 of each motor that is driven, shape (n, motors)."""
     if outputs is None or motors is None or len(outputs) < _LEAST_ROWS:
         return None
-    channels = [c for c in motors.channels if outputs.value[:, c].any()]
-    if not channels:
+    runs = _running(outputs, motors)
+    if not runs.any():
         return None
+    channels = np.array(motors.channels)[runs]
     driven = outputs.value[:, channels]
     duty = np.clip((driven - motors.low) / (motors.high - motors.low), 0.0, 1.0)
     return Series(outputs.time, duty)
+
+
+def duty_of(recording: Recording) -> Duty | None:
+    """How hard each motor is driven; None where the recording does not tell."""
+    motors = _motors(recording)
+    duty = _duty(recording.outputs, motors)
+    if recording.outputs is None or motors is None or duty is None:
+        return None
+    numbers = motors.numbers or tuple(range(1, len(motors.channels) + 1))
+    runs = _running(recording.outputs, motors)
+    return Duty(duty, tuple(n for n, does in zip(numbers, runs, strict=True) if does))
+
+
+def _running(outputs: Series, motors: MotorOutputs) -> BoolArray:
+    """Which of the motors' channels are driven at all."""
+    return np.asarray(outputs.value[:, list(motors.channels)].any(axis=0))
 
 
 def _motors(recording: Recording) -> MotorOutputs | None:
@@ -158,13 +209,13 @@ def _finer(recording: Recording, duty: Series | None) -> list[tuple[Series, str]
     return found
 
 
-def _best(forms: list[_Rebuilt | None]) -> list[Control]:
+def _best(forms: list[Rebuilt | None]) -> list[Control]:
     """The form that explains what was reported best; none where none does."""
     whole = [form for form in forms if form is not None]
     return [min(whole, key=lambda form: form.cost).control] if whole else []
 
 
-def _rebuilt(reference: Series, duty: Series, kind: str, name: str) -> _Rebuilt | None:
+def rebuild(reference: Series, duty: Series, kind: str, name: str) -> Rebuilt | None:
     """The reference regressed on powers of the duty, shape (n, k), sampled more often.
 
     A battery monitor smooths what it measures. Where the duty is told often enough to show that,
@@ -173,7 +224,7 @@ def _rebuilt(reference: Series, duty: Series, kind: str, name: str) -> _Rebuilt 
     """
     if len(reference) < _LEAST_ROWS:
         return None
-    powers = np.stack([np.mean(duty.value**k, axis=1) for k in (1, 2, 3)], axis=1)
+    powers = np.stack([np.mean(duty.value**k, axis=1) for k in POWERS], axis=1)
     features = Series(duty.time, powers)
     plain = _rebuilt_through(reference, features, 0.0, kind, name)
     if plain is None:
@@ -191,9 +242,9 @@ def _rebuilt(reference: Series, duty: Series, kind: str, name: str) -> _Rebuilt 
 
 def _rebuilt_through(
     reference: Series, features: Series, smoothing: float, kind: str, name: str
-) -> _Rebuilt | None:
+) -> Rebuilt | None:
     """The quantity of which the reference is the smoothed one."""
-    seen = _smoothed(features, smoothing)
+    seen = smoothed(features, smoothing)
     fits = [_regress(reference, seen, shift) for shift in _SHIFTS]
     best = min(range(len(fits)), key=lambda k: fits[k][1])
     coefficients, cost = fits[best]
@@ -204,11 +255,12 @@ def _rebuilt_through(
     left = reference.value - interpolate(as_reported, reference.time)
     trend = _running_mean(Series(reference.time, left), _TREND_S)
     modelled = coefficients[0] + features.value @ coefficients[1:]
-    value = np.maximum(modelled + interpolate(trend, time), 0.0)
-    return _Rebuilt(Control(kind, Series(time, value), name), cost)
+    slow = interpolate(trend, time)
+    value = np.maximum(modelled + slow, 0.0)
+    return Rebuilt(Control(kind, Series(time, value), name), cost, coefficients, slow)
 
 
-def _smoothed(series: Series, constant: float) -> Series:
+def smoothed(series: Series, constant: float) -> Series:
     """What a first-order low pass of a time constant in seconds makes of columns, (n, k)."""
     if constant <= 0.0:
         return series

@@ -275,6 +275,7 @@ def _told(in_force: InForce, applied: Applied) -> InForce:
 def _corrects_alike(one: InForce, other: InForce) -> bool:
     return (
         one.regressor == other.regressor
+        and one.exponent == other.exponent
         and np.array_equal(one.correction.offset, other.correction.offset)
         and np.array_equal(one.correction.soft_iron, other.correction.soft_iron)
         and np.array_equal(one.correction.motor, other.correction.motor)

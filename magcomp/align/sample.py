@@ -8,7 +8,7 @@ import numpy as np
 
 from magcomp.errors import MissingDataError
 from magcomp.geometry import gravity_direction
-from magcomp.model import Control, FloatArray, Lags, Readings, Samples, Series
+from magcomp.model import Control, FloatArray, Lags, Readings, Samples, Series, quantity_of
 
 _RATE_STEP_S = 0.05
 
@@ -110,8 +110,10 @@ def _undo(
                 raise MissingDataError(
                     f"A motor compensation by {stretch.regressor} was in force, so the log must "
                     f"hold the {stretch.regressor}; instead it holds none"
+                    + quantity_of(stretch.regressor).how_to_have
                 )
             series = controls[stretch.regressor].series
+            series = Series(series.time, stretch.multiplied(series.value))
             added = stretch.correction.added
             field = field - added(interpolate(series, applied[rows]))
             # d/dlag of −MOT·u(t − lag) is +MOT·u̇.
@@ -145,6 +147,6 @@ def _as_now(
     if rows.any():
         u = np.zeros(int(rows.sum()))
         if present.regressor is not None and present.regressor in controls:
-            u = interpolate(controls[present.regressor].series, applied[rows])
+            u = present.multiplied(interpolate(controls[present.regressor].series, applied[rows]))
         field[rows] = present.correction.apply(raw[rows], u)
     return field

@@ -8,12 +8,25 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from magcomp import autopilots
-from magcomp.align import controls, expected_earth, has_position, readings, reported, thinned
+from magcomp.align import (
+    controls,
+    currents_of_motors,
+    expected_earth,
+    readings,
+    reported,
+    thinned,
+    to_undo,
+)
 from magcomp.align.health import compass_complaints, current_complaints, vehicle_complaints
+from magcomp.align.orientation import orientation_complaint
 from magcomp.analysis.choose import with_speed_controllers
-from magcomp.analysis.compare import Judged, beaten, better, comparison
+from magcomp.analysis.compare import Judged, beaten, better
 from magcomp.analysis.emit import Emission, emit
-from magcomp.analysis.multiplied import kinds_to_try, multiplied_notes, why_only_to_look_at
+from magcomp.analysis.forms import compared, forms_notes
+from magcomp.analysis.motor_by_motor import Answer, as_written
+from magcomp.analysis.multiplied import kinds_to_try, why_only_to_look_at
+from magcomp.analysis.notes import lacking_notes, notes_of
+from magcomp.analysis.origin import hints
 from magcomp.analysis.vehicle_words import in_words_of
 from magcomp.earth import EarthField
 from magcomp.errors import MissingDataError, UsageError
@@ -29,10 +42,12 @@ from magcomp.fit import (
 from magcomp.judge import judge, judge_present
 from magcomp.model import (
     CURRENT,
+    MOTORS,
     THROTTLE,
     Analysis,
     CompassResult,
     Control,
+    Form,
     Recording,
     Verdict,
     pack,
@@ -40,7 +55,7 @@ from magcomp.model import (
 )
 
 ESC = "esc"
-REGRESSORS = ("auto", CURRENT, THROTTLE, "motors", ESC)
+REGRESSORS = ("auto", CURRENT, THROTTLE, MOTORS, ESC)
 
 Progress = Callable[[str, float], None]
 """What is being done, and the share done, 0 … 1."""
@@ -75,11 +90,6 @@ class Options:
             raise UsageError(
                 f"The regressor must be one of {', '.join(REGRESSORS)}; "
                 f"instead received {self.regressor}"
-            )
-        if self.regressor == "motors":
-            raise UsageError(
-                "The regressor must be auto, current or throttle; instead received motors: "
-                "compensation per motor is not fitted yet"
             )
         if not self.start < self.end:
             raise UsageError(
@@ -118,21 +128,24 @@ def analyse(
         wanted = replace(wanted, regressor=CURRENT)
     compasses = _compasses(recording, wanted)
     found = _controls_of(recording)
+    motors = currents_of_motors(recording)
+    if wanted.regressor == MOTORS and not motors:
+        raise _no_motors(recording)
     kinds = _kinds(recording, found, wanted)
-    earth = expected_earth(recording)
+    earth, in_force = expected_earth(recording), to_undo(recording, found)
     steps = len(kinds) * len(compasses)
     judged: dict[str, list[Judged]] = {}
     lacking: dict[int, MissingDataError] = {}
     plain: dict[str, tuple[float, ...]] = {}
     for kind in kinds:
-        forms = [control for control in found if control.kind == kind]
+        forms = [control for control in (*found, *motors) if control.kind == kind]
         if kind == THROTTLE and CURRENT in judged and (left := beaten(judged[CURRENT], forms)):
             plain[kind] = left
             continue
         for compass in compasses:
             progress(f"compass {compass} by {kind}", sum(map(len, judged.values())) / steps)
             try:
-                result = _one(recording, compass, wanted, forms, reported(found), earth)
+                result = _one(recording, compass, wanted, forms, in_force, earth)
             except MissingDataError as error:
                 lacking.setdefault(compass, error)
                 continue
@@ -141,9 +154,11 @@ def analyse(
     if not judged:
         raise _with_cure(recording, compasses[0], lacking[compasses[0]])
     progress("done", 1.0)
-    chosen = better(judged)
-    emitted = emit(recording, [j.fit for j in judged[chosen]])
-    nothing = all(j.is_rejected for j in judged[chosen])
+    chosen = MOTORS if MOTORS in judged else better(judged)
+    answers = [as_written(recording, each) for each in judged[chosen]]
+    emitted = emit(recording, [each.written for each in answers])
+    nothing = all(each.judged.is_rejected for each in answers)
+    forms_of = compared(judged, motors, reported(found).get(THROTTLE))
     held_out = {k: tuple(j.held_out for j in results) for k, results in judged.items()} | plain
     why_not = why_only_to_look_at(recording, chosen)
     return Analysis(
@@ -152,26 +167,38 @@ def analyse(
         vehicle=recording.vehicle,
         compasses=tuple(
             _result(
-                j,
-                Emission({}, {}) if why_not else emitted[j.fit.compass],
+                each,
+                Emission({}, {}) if why_not else emitted[each.written.compass],
+                forms_of.get(each.written.compass, ()),
                 nothing_accepted=nothing,
             )
-            for j in judged[chosen]
+            for each in answers
         ),
-        notes=(*_notes(recording, wanted, held_out, chosen), *_lacking_notes(lacking, judged)),
+        notes=(
+            *notes_of(recording, wanted.compass, held_out, chosen),
+            *forms_notes(forms_of, judged, chosen),
+            *lacking_notes(lacking, judged),
+            *hints([each.judged.fit for each in answers]),
+        ),
         only_to_look_at=why_not,
     )
 
 
-def _result(judged: Judged, emitted: Emission, *, nothing_accepted: bool) -> CompassResult:
+def _result(
+    answer: Answer, emitted: Emission, forms: tuple[Form, ...], *, nothing_accepted: bool
+) -> CompassResult:
+    judged = answer.judged
+    accepted = answer.parameters or emitted.accepted
     left_out = {} if nothing_accepted else emitted.left_out
     return CompassResult(
         fit=judged.fit,
         verdict=judged.verdict,
         in_force=judged.problem.readings.in_force[-1].correction,
-        parameters=left_out if judged.is_rejected else emitted.accepted,
-        insisted=emitted.accepted,
+        parameters=left_out if judged.is_rejected else accepted,
+        insisted=accepted,
         left_out=emitted.left_out,
+        forms=forms,
+        as_written=answer.told,
     )
 
 
@@ -187,11 +214,11 @@ def check(recording: Recording, options: Options | None = None) -> Mapping[int, 
     compasses = _compasses(recording, wanted)
     found = _controls_of(recording)
     earth = expected_earth(recording)
-    by_kind = reported(found)
+    by_kind = to_undo(recording, found)
     verdicts = {}
     for compass in compasses:
         new = thinned(readings(recording, compass, start=wanted.start, end=wanted.end))
-        kind = new.in_force[-1].regressor or found[0].kind
+        kind = _single(new.in_force[-1].regressor) or found[0].kind
         if kind not in by_kind:
             raise MissingDataError(
                 f"Compass {compass} is corrected by {kind}, so {recording.source} must hold the "
@@ -203,6 +230,11 @@ def check(recording: Recording, options: Options | None = None) -> Mapping[int, 
         require_finite(compass, _bounds(verdict))
         verdicts[compass] = _in_words_of(recording, verdict)
     return verdicts
+
+
+def _single(kind: str | None) -> str | None:
+    """The quantity of one part by which a correction in force is told."""
+    return None if kind is None else quantity_of(kind).single
 
 
 def regressor_in_force(recording: Recording) -> str:
@@ -231,6 +263,9 @@ def _one(
         problem = best_form([Problem(new, form, in_force, earth) for form in forms])
     complaints = _complaints(recording, compass, problem.control.kind)
     with solvable(compass):
+        samples = problem.sample(problem.usual_lags())
+        if turned := orientation_complaint(recording, samples, earth):
+            complaints = (turned, *complaints)
         found, verdict = judge(problem, fit(problem, wanted.method), complaints=complaints)
     require_finite(compass, (found.covariance, pack(found.correction), *_bounds(verdict)))
     return Judged(problem, found, _in_words_of(recording, verdict))
@@ -274,6 +309,9 @@ def _kinds(recording: Recording, found: Iterable[Control], wanted: Options) -> l
     kinds = list(dict.fromkeys(control.kind for control in found))
     if wanted.regressor == "auto":
         return kinds_to_try(recording, kinds)
+    if wanted.regressor == MOTORS:
+        # What one current leaves is what the motors have to be weighed against.
+        return [*(kind for kind in kinds if kind == quantity_of(MOTORS).single), MOTORS]
     if wanted.regressor not in kinds:
         raise MissingDataError(
             f"{recording.source} must hold a {wanted.regressor} that changes; instead it holds "
@@ -299,47 +337,26 @@ def _compasses(recording: Recording, wanted: Options) -> list[int]:
     return found
 
 
+def _no_motors(recording: Recording) -> MissingDataError:
+    lacks = [
+        what
+        for what, series in (
+            ("the battery's current", recording.current),
+            ("the motors' outputs (SERVO_OUTPUT_RAW or RCOU)", recording.outputs),
+        )
+        if series is None
+    ]
+    holds = (
+        f"it lacks {' and '.join(lacks)}" if lacks else "the current does not follow the outputs"
+    )
+    return MissingDataError(
+        f"{recording.source} must hold the battery's current and the outputs of all motors for a "
+        f"fit motor by motor; instead {holds}"
+    )
+
+
 def _with_cure(recording: Recording, compass: int, lacking: MissingDataError) -> MissingDataError:
     if compass not in recording.field:
         return lacking
     how = autopilots.of(recording).how_to_record("more readings", recording.format)
     return MissingDataError(f"{lacking}: {how}")
-
-
-def _lacking_notes(
-    lacking: Mapping[int, MissingDataError], judged: Mapping[str, list[Judged]]
-) -> Iterable[str]:
-    done = {j.fit.compass for results in judged.values() for j in results}
-    for compass, why in sorted(lacking.items()):
-        if compass not in done:
-            yield f"compass {compass} is left out: {why}"
-
-
-def _notes(
-    recording: Recording, wanted: Options, held_out: Mapping[str, tuple[float, ...]], chosen: str
-) -> Iterable[str]:
-    if len(held_out) > 1:
-        yield comparison(held_out, chosen)
-    elif quantity_of(chosen).is_throttle and recording.current is None:
-        yield "the log holds no battery current, so throttle is used"
-    if not has_position(recording):
-        yield "the log holds no position: the earth's field is taken from the readings themselves"
-    yield from multiplied_notes(recording, chosen)
-    autopilot = autopilots.of(recording)
-    yield from autopilot.reading_notes(recording)
-    yield from autopilot.warnings(recording.parameters.latest)
-    for compass, why in sorted(autopilot.left_out(recording.parameters).items()):
-        if compass in recording.field and wanted.compass is None:
-            yield f"compass {compass} is left out: {why}"
-    if not recording.parameters.names:
-        yield (
-            "the log holds no parameters: the calibration in force is unknown, so only the motor "
-            "vector is given, and it is right only if no motor compensation was in force"
-        )
-    yield from recording.report.notes
-    others = recording.report.others
-    if others:
-        named = ", ".join(f"{system}:{component}" for system, component in others)
-        yield f"messages of other systems were left out ({named})"
-    if recording.report.bad_checksum:
-        yield f"{recording.report.bad_checksum} damaged messages were left out"

@@ -10,7 +10,7 @@ import numpy as np
 from magcomp.errors import MagcompError
 from magcomp.fit import Problem, best_form, fit_alike, solvable
 from magcomp.judge import field_residual
-from magcomp.model import CURRENT, THROTTLE, Control, Grade, MotorFit, Verdict
+from magcomp.model import CURRENT, MOTORS, THROTTLE, Control, Grade, MotorFit, Verdict
 
 BETTER = 0.97
 """Throttle is written instead of current only where it leaves less than this share unexplained:
@@ -120,4 +120,5 @@ def comparison(held_out: Mapping[str, Sequence[float]], chosen: str) -> str:
         f"{kind} leaves {'/'.join(f'{left:.1f}' for left in each)} mGauss"
         for kind, each in held_out.items()
     )
-    return f"{chosen} is used because it is the better choice on held-out data: {scores}"
+    why = "was asked for" if chosen == MOTORS else "is the better choice on held-out data"
+    return f"{chosen} is used because it {why}: {scores}"

@@ -40,7 +40,7 @@ def why_only_to_look_at(recording: Recording, kind: str) -> str:
     """Why a fit against a control quantity cannot be written; empty where it can."""
     autopilot = autopilots.of(recording)
     can = autopilot.multiplied(recording.vehicle)
-    if kind not in can:
+    if quantity_of(kind).single not in can:
         return (
             f"{autopilot.title} multiplies only the {' or '.join(can)} in a "
             f"{recording.vehicle.kind}: a fit by {kind} is to look at, and cannot be written"

@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
-from magcomp.autopilots import ardupilot_settings
+from magcomp.autopilots import ardupilot_per_motor, ardupilot_settings
 from magcomp.autopilots.ardupilot_correction import (
     COMPENSATION_OF,
     Calibration,
@@ -44,6 +44,7 @@ from magcomp.autopilots.terms import (
     Kind,
     LagPrior,
     LagPriors,
+    MotorLaw,
     MotorOutputs,
     ParameterName,
     ThrustCurve,
@@ -61,12 +62,16 @@ from magcomp.model import (
     Vehicle,
 )
 
-_MOTOR_FUNCTIONS = frozenset([*range(33, 41), *range(82, 86)])
+_MOTOR_FUNCTIONS = {
+    function: number for number, function in enumerate([*range(33, 41), *range(82, 86)], start=1)
+}
+"""SERVOn_FUNCTION to the number of the motor that it drives."""
+
 _DEFAULT_MOTORS = 4
 _OUTPUTS_ASKED_FOR = 8
 _CURVE_NAMES = ("MOT_THST_EXPO", "MOT_SPIN_MIN", "MOT_SPIN_MAX")
 _PWM_NAMES = ("MOT_PWM_MIN", "MOT_PWM_MAX")
-_TOLD_PER_READING = (Kind.OFFSET, Kind.MOTOR)
+_TOLD_PER_READING = (Kind.OFFSET, Kind.MOTOR, Kind.PER_MOTOR)
 
 _OTHER_COMPASSES = ("SCALED_IMU2", "SCALED_IMU3")
 _LINK = LagPriors(LagPrior(0.08, 0.1), LagPrior(0.08, 0.1))
@@ -165,19 +170,21 @@ class ArduPilot:
         AP_MotorsMulticopter: output = spin_min + (spin_max − spin_min) · c(thrust), with
         thrust = (1 − expo) · c + expo · c².
         """
-        by_function = [
-            index
-            for index in range(outputs)
-            if parameters.last(f"SERVO{index + 1}_FUNCTION", 0.0) in _MOTOR_FUNCTIONS
-        ]
-        channels = by_function or range(min(_DEFAULT_MOTORS, outputs))
+        functions = [parameters.last(f"SERVO{index + 1}_FUNCTION", 0.0) for index in range(outputs)]
+        driven = {
+            index: _MOTOR_FUNCTIONS[function]
+            for index, function in enumerate(functions)
+            if function in _MOTOR_FUNCTIONS
+        } or {index: index + 1 for index in range(min(_DEFAULT_MOTORS, outputs))}
         low, high = (
             parameters.last(name, 0.0) or default
             for name, default in zip(_PWM_NAMES, (1000.0, 2000.0), strict=True)
         )
         if not high > low:
             return None
-        return MotorOutputs(tuple(channels), low, high, self._thrust_curve(parameters))
+        driven = dict(sorted(driven.items(), key=lambda item: item[1]))
+        curve = self._thrust_curve(parameters)
+        return MotorOutputs(tuple(driven), low, high, curve, tuple(driven.values()))
 
     @staticmethod
     def _thrust_curve(parameters: ParameterHistory) -> ThrustCurve | None:
@@ -206,6 +213,10 @@ class ArduPilot:
         """By COMPASS_DEV_ID, and what COMPASS_EXTERNAL, ORIENT and USE say of each."""
         return ardupilot_settings.compasses(values)
 
+    def orientation_name(self, compass: int) -> str:
+        """COMPASS_ORIENT of the compass."""
+        return single_name("ORIENT", compass)
+
     def changes(
         self,
         parameters: ParameterHistory,
@@ -214,22 +225,23 @@ class ArduPilot:
         told_per_reading: bool = False,
     ) -> tuple[float, ...]:
         """Any report of an acting parameter with another value than before."""
-        names = ACTING
+        names = (*ACTING, *ardupilot_per_motor.NAMES)
         if told_per_reading:
             names = tuple(
                 name
-                for name in ACTING
+                for name in names
                 if (found := parse(name)) is None or found.kind not in _TOLD_PER_READING
             )
         return calibration_changes(parameters, names)
 
     def in_force(self, values: Mapping[str, float], compass: int) -> InForce:
         """Every parameter acts at once, armed or not."""
-        return in_force(calibration(values, compass))
+        return ardupilot_per_motor.over(in_force(calibration(values, compass)), compass, values)
 
     def in_force_at(self, parameters: ParameterHistory, compass: int, time: float) -> InForce:
         """Every parameter acts from its report, armed or not."""
-        return in_force(calibration_at(parameters, compass, time), unseen(parameters, compass))
+        found = in_force(calibration_at(parameters, compass, time), unseen(parameters, compass))
+        return ardupilot_per_motor.over_at(found, compass, parameters, time)
 
     def in_force_over(
         self,
@@ -247,7 +259,7 @@ class ArduPilot:
         return in_force(calibration(values, 1)).regressor
 
     def left_out(self, parameters: ParameterHistory) -> Mapping[int, InputError]:
-        """Compass 1 while it is corrected per motor, and compasses with a value that is none."""
+        """Compasses with a value that is none, or a soft iron that cannot be undone."""
         return ardupilot_settings.left_out(parameters)
 
     def correction_parameters(
@@ -276,6 +288,26 @@ class ArduPilot:
             if name in values or (soft_iron_fitted and _is(name, Kind.DIAGONAL, Kind.OFF_DIAGONAL))
         }
 
+    def motor_law(self, compass: int, values: Mapping[str, float]) -> MotorLaw | None:
+        """COMPASS_PMOT, which only compass 1 has, and only in some builds."""
+        return ardupilot_per_motor.law(compass, values)
+
+    def per_motor_parameters(
+        self,
+        correction: Correction,
+        exponent: float,
+        compass: int,
+        values: Mapping[str, float],
+        *,
+        soft_iron_fitted: bool,
+    ) -> dict[str, float]:
+        """COMPASS_PMOT in the place of COMPASS_MOT, which the firmware then ignores."""
+        made = self.correction_parameters(
+            correction, compass, values, regressor=CURRENT, soft_iron_fitted=soft_iron_fitted
+        )
+        rest = {name: value for name, value in made.items() if not _is(name, Kind.MOTOR)}
+        return rest | ardupilot_per_motor.parameters(correction.motor, exponent)
+
     def switch_parameters(
         self,
         regressor: str,
@@ -286,6 +318,8 @@ class ArduPilot:
     ) -> dict[str, float]:
         """COMPASS_MOTCT, and zeros for what it would wake."""
         made = {COMPENSATION_SWITCH: float(COMPENSATION_OF[regressor])}
+        if 1 in compasses and values.get(PER_MOTOR_SWITCH, 0.0):
+            made[PER_MOTOR_SWITCH] = 0.0
         for compass in NUMBERS:
             stored = (values.get(name, 0.0) for name in vector_names("MOT", compass))
             if compass not in compasses and any(stored):

@@ -24,7 +24,7 @@ from magcomp.autopilots.ardupilot_names import (
     vector_names,
 )
 from magcomp.autopilots.terms import Kind
-from magcomp.errors import InputError, MissingDataError
+from magcomp.errors import InputError
 from magcomp.model import Compass, ParameterHistory
 
 _OFFSETS_MAX_DEFAULT = 1800.0
@@ -58,13 +58,7 @@ def _whole(values: Mapping[str, float], name: str) -> int | None:
 
 
 def left_out(parameters: ParameterHistory) -> dict[int, InputError]:
-    """Compasses whose correction cannot be undone, with the error that says so.
-
-    Notes
-    -----
-    COMPASS_PMOT_EN overrides COMPASS_MOTCT for compass 1 (docs/autopilots.md,
-    ArduPilot: control quantity).
-    """
+    """Compasses whose correction cannot be undone, with the error that says so."""
     found: dict[int, InputError] = {}
     for number in NUMBERS:
         names = (*acting_on(number), COMPENSATION_SWITCH)
@@ -78,11 +72,6 @@ def left_out(parameters: ParameterHistory) -> dict[int, InputError]:
             found[number] = not_finite(bad)
         elif (error := not_undoable(parameters, number)) is not None:
             found[number] = error
-    if parameters.last(PER_MOTOR_SWITCH, 0.0):
-        found[1] = MissingDataError(
-            f"{PER_MOTOR_SWITCH} must be 0 while compass 1 is recorded; instead it is on, and a "
-            "correction per motor cannot be undone from a log"
-        )
     return found
 
 
@@ -90,8 +79,8 @@ def warnings(values: Mapping[str, float]) -> Iterator[str]:
     """What stands in the way of a good calibration."""
     if values.get(PER_MOTOR_SWITCH, 0.0):
         yield (
-            f"{PER_MOTOR_SWITCH} is on: compass 1 is corrected per motor and ignores COMPASS_MOT "
-            f"and {COMPENSATION_SWITCH}, so it is left out; set it to 0 to calibrate compass 1"
+            f"{PER_MOTOR_SWITCH} is on: compass 1 is corrected motor by motor and ignores "
+            f"COMPASS_MOT and {COMPENSATION_SWITCH}"
         )
     learn = values.get(LEARN, 0.0)
     if learn:

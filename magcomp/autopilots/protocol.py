@@ -11,7 +11,13 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import Protocol
 
 from magcomp.autopilots.motor_test import MotorTest
-from magcomp.autopilots.terms import FieldMeaning, LagPriors, MotorOutputs, ParameterName
+from magcomp.autopilots.terms import (
+    FieldMeaning,
+    LagPriors,
+    MotorLaw,
+    MotorOutputs,
+    ParameterName,
+)
 from magcomp.errors import InputError
 from magcomp.model import (
     Compass,
@@ -185,6 +191,10 @@ class Autopilot(Protocol):
         """The compasses that the parameters tell of, in the order of their slots."""
         ...
 
+    def orientation_name(self, compass: int) -> str:
+        """The parameter that says how a compass is mounted."""
+        ...
+
     def changes(
         self,
         parameters: ParameterHistory,
@@ -273,6 +283,31 @@ class Autopilot(Protocol):
         usual
             The control quantity in ordinary flight; 0 where unknown. Where a firmware cannot take
             a value over as it is, the field is right here.
+        """
+        ...
+
+    def motor_law(self, compass: int, values: Mapping[str, float]) -> MotorLaw | None:
+        """How it can correct a compass motor by motor; None where it cannot."""
+        ...
+
+    def per_motor_parameters(
+        self,
+        correction: Correction,
+        exponent: float,
+        compass: int,
+        values: Mapping[str, float],
+        *,
+        soft_iron_fitted: bool,
+    ) -> dict[str, float]:
+        """Parameters that make this vehicle apply a correction motor by motor, switch included.
+
+        Parameters
+        ----------
+        correction
+            Its motor vectors are per volt to the power of ``exponent``, in the order of the
+            law's motors.
+        soft_iron_fitted
+            As for :meth:`correction_parameters`.
         """
         ...
 

@@ -42,6 +42,7 @@ from magcomp.autopilots.terms import (
     FieldMeaning,
     LagPrior,
     LagPriors,
+    MotorLaw,
     MotorOutputs,
     ParameterName,
     ThrustCurve,
@@ -184,6 +185,10 @@ class Px4:
         """By CAL_MAGn_ID."""
         return px4_settings.compasses(values)
 
+    def orientation_name(self, compass: int) -> str:
+        """CAL_MAGn_ROT of the compass."""
+        return single_name("ROT", compass)
+
     def changes(
         self,
         parameters: ParameterHistory,
@@ -256,6 +261,22 @@ class Px4:
             found |= _vector("SCALE", compass, made.scale)
             found |= _vector("ODIAG", compass, made.off_diagonal)
         return found
+
+    def motor_law(self, compass: int, values: Mapping[str, float]) -> MotorLaw | None:  # noqa: ARG002
+        """None: PX4 multiplies one quantity for all motors."""
+        return None
+
+    def per_motor_parameters(
+        self,
+        correction: Correction,  # noqa: ARG002
+        exponent: float,  # noqa: ARG002
+        compass: int,  # noqa: ARG002
+        values: Mapping[str, float],  # noqa: ARG002
+        *,
+        soft_iron_fitted: bool,  # noqa: ARG002
+    ) -> dict[str, float]:
+        """None, as there is no such law."""
+        return {}
 
     def switch_parameters(
         self,

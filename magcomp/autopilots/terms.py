@@ -130,9 +130,28 @@ class MotorOutputs:
         Microseconds of duty 0 and 1.
     curve
         From thrust demand to duty; None where unknown.
+    numbers
+        The motor that each channel drives, as the firmware counts them, from 1.
     """
 
     channels: tuple[int, ...]
     low: float
     high: float
     curve: ThrustCurve | None
+    numbers: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class MotorLaw:
+    """How a firmware corrects motor by motor: Σ vector · (duty · volts) to the power of exponent.
+
+    Attributes
+    ----------
+    numbers
+        The motors it has vectors for.
+    most_exponent
+        The largest exponent that it takes.
+    """
+
+    numbers: tuple[int, ...]
+    most_exponent: float

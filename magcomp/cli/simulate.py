@@ -15,7 +15,7 @@ from magcomp.cli.output import answer, complain
 from magcomp.cli.work import read_parameters
 from magcomp.errors import ExitCode
 from magcomp.link import read_signing_key
-from magcomp.simulate import AUTOPILOTS, PROGRAMS, Faults, Vehicle, scenario, serve
+from magcomp.simulate import AUTOPILOTS, PROGRAMS, Faults, Scenario, Vehicle, scenario, serve
 
 _ADDRESS = "udpout:127.0.0.1:14550"
 
@@ -49,9 +49,35 @@ def _fault_options(command: Callable[..., _Result]) -> Callable[..., _Result]:
     return with_faults
 
 
+def _scenario_options(command: Callable[..., _Result]) -> Callable[..., _Result]:
+    """Give a command which vehicle flies what."""
+
+    @click.option("--seed", type=int, default=1, show_default=True, help="Which vehicle.")
+    @click.option(
+        "--program",
+        type=click.Choice(PROGRAMS),
+        default="flight",
+        show_default=True,
+        help="What it does once a ground station speaks to it.",
+    )
+    @click.option(
+        "--motor-spread",
+        type=click.FloatRange(0.0, 10.0),
+        metavar="SHARE",
+        help="How unequally its motors disturb, as a share of the interference; 0.05 by default.",
+    )
+    @functools.wraps(command)
+    def with_scenario(
+        seed: int, program: str, motor_spread: float | None, **others: object
+    ) -> _Result:
+        chosen = scenario(program, seed, motor_spread=motor_spread)
+        return command(chosen=chosen, program=program, **others)
+
+    return with_scenario
+
+
 @click.command("simulate")
 @click.argument("address", default=_ADDRESS)
-@click.option("--seed", type=int, default=1, show_default=True, help="Which vehicle.")
 @click.option(
     "--autopilot",
     type=click.Choice(list(AUTOPILOTS)),
@@ -59,13 +85,7 @@ def _fault_options(command: Callable[..., _Result]) -> Callable[..., _Result]:
     show_default=True,
     help="Whose firmware it has.",
 )
-@click.option(
-    "--program",
-    type=click.Choice(PROGRAMS),
-    default="flight",
-    show_default=True,
-    help="What it does once a ground station speaks to it.",
-)
+@_scenario_options
 @click.option(
     "--speed",
     type=float,
@@ -102,9 +122,9 @@ def _fault_options(command: Callable[..., _Result]) -> Callable[..., _Result]:
 )
 def simulate(
     address: str,
-    seed: int,
-    autopilot: str,
+    chosen: Scenario,
     program: str,
+    autopilot: str,
     speed: float,
     faults: Faults | None,
     truth: Path | None,
@@ -121,7 +141,6 @@ def simulate(
     written. Its compasses are disturbed by its motors; --truth says how. Ctrl-C ends it.
     """
     key = None if signing_key is None else read_signing_key(signing_key)
-    chosen = scenario(program, seed)
     held = {} if parameters is None else read_parameters(parameters).values
     vehicle = Vehicle(
         chosen,
@@ -137,8 +156,8 @@ def simulate(
 
     def announce(reached_at: str) -> None:
         complain(
-            f"A simulated vehicle ({autopilot}, seed {seed}) waits for a ground station, then: "
-            f"{program}, {vehicle.duration_s / speed:.0f} s. Reach it with:\n"
+            f"A simulated vehicle ({autopilot}, seed {chosen.truth.seed}) waits for a ground "
+            f"station, then: {program}, {vehicle.duration_s / speed:.0f} s. Reach it with:\n"
             f"  magcomp calibrate {reached_at}"
         )
         answer(f"{reached_at}\n")

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from magcomp.align import controls, expected_earth, interpolate, readings, reported
+from magcomp.align import controls, expected_earth, interpolate, readings, reported, to_undo
 from magcomp.compensate.compensator import Compensator
 from magcomp.compensate.fusion import Fusion, Motion, Reading, Tuning, fuse
 from magcomp.errors import MissingDataError
@@ -108,7 +108,8 @@ def track(
             f"{compass} multiplies; instead it holds {', '.join(reported(found)) or 'neither'}"
         )
     with solvable(compass):
-        problem = best_form([Problem(new, form, reported(found), earth) for form in forms])
+        in_force = to_undo(recording, found)
+        problem = best_form([Problem(new, form, in_force, earth) for form in forms])
         lags, _ = estimate_lags(problem, correction)
     samples = problem.sample(lags)
     compensator = Compensator(correction, earth.declination)

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from magcomp.errors import FitRejectedError, MissingDataError, UsageError
+from magcomp.fit.combine import still_rows, with_sweep
 from magcomp.fit.field_model import (
     FIELD_LAG,
     REGRESSOR_LAG,
@@ -17,6 +18,7 @@ from magcomp.fit.field_model import (
     errors_of,
     indices_of_correction,
     lags_of,
+    parameters_of,
     vertical_of,
 )
 from magcomp.fit.flight import (
@@ -32,11 +34,11 @@ from magcomp.fit.flight import (
 )
 from magcomp.fit.folds import folds
 from magcomp.fit.levels import centres_of_flight, fit_levels, usable_levels, with_line
+from magcomp.fit.motors import alike_where_unseen, blur, differences_of
 from magcomp.fit.residual import residuals, spread
 from magcomp.fit.robust import Estimate
 from magcomp.fit.sweep import fit_sweep, is_still
 from magcomp.model import (
-    CORRECTION_SIZE,
     MOTOR,
     OFFSET,
     BoolArray,
@@ -44,7 +46,6 @@ from magcomp.model import (
     Lags,
     MotorFit,
     Readings,
-    pack,
 )
 
 METHODS = ("auto", "sweep", "levels", "flight")
@@ -106,7 +107,13 @@ def fit(problem: Problem, method: str = "auto") -> MotorFit:
         )
     if method in ("auto", "sweep") and still:
         return fit_sweep(problem)
-    if method in ("auto", "levels"):
+    by_one = problem.control.parts == 1
+    if method == "levels" and not by_one:
+        raise FitRejectedError(
+            "The method of levels needs one current or throttle; instead received the current of "
+            "each motor, which steady levels do not tell apart: use the method flight"
+        )
+    if method in ("auto", "levels") and by_one:
         rows, level = usable_levels(problem)
         count = len(np.unique(level))
         if count >= 2 and (method == "levels" or len(rows) > 0.4 * len(samples)):
@@ -154,20 +161,7 @@ def refit(problem: Problem, fit: MotorFit, keep: BoolArray) -> MotorFit:
             return fit
         again = fit_levels(part, rows, level)[0]
         return replace(again, lags=fit.lags, lags_std=fit.lags_std, vertical=fit.vertical)
-    return _updated(fit, near(part, _groups(fit), _parameters_of(fit)))
-
-
-def _parameters_of(fit: MotorFit) -> FloatArray:
-    """The parameters of a flight's fit, shape (SIZE,), with nothing said of tilt and lean."""
-    packed = pack(fit.correction)
-    return np.concatenate(
-        [
-            packed[:CORRECTION_SIZE],
-            [fit.strength, fit.vertical / fit.strength, fit.lags.field, fit.lags.regressor],
-            np.zeros(SIZE - CORRECTION_SIZE - 4),
-            packed[CORRECTION_SIZE:],
-        ]
-    )
+    return _updated(fit, near(part, _groups(fit), parameters_of(fit, fit.lags)))
 
 
 def _surer(by_levels: MotorFit, by_flight: MotorFit) -> MotorFit:
@@ -199,9 +193,20 @@ def _with_lags(problem: Problem, fit: MotorFit) -> MotorFit:
 
 
 def fit_flight(problem: Problem) -> MotorFit:
-    """Fit a flight, opening as many groups of parameters as the data deserve."""
-    found, free = with_wander(problem, *_choose_freedom(problem))
-    bare = _of_flight(problem, found, free)
+    """Fit a flight, opening as many groups of parameters as the data deserve.
+
+    A sweep on the ground in the same recording is fitted by itself, and the two are put together.
+    """
+    still = still_rows(problem.sample(Lags())) if problem.control.parts == 1 else None
+    flown = problem if still is None else problem.where(~still)
+    found, free = with_wander(flown, *_choose_freedom(flown))
+    tell = differences_of(len(found.parameters))
+    told_apart = tell @ found.covariance @ tell.T
+    if len(told_apart):
+        found = alike_where_unseen(found, blur(problem.control.series.value))
+    bare = replace(_of_flight(problem, found, free), told_apart=told_apart)
+    if still is not None:
+        bare = with_sweep(bare, fit_sweep(problem.where(still)))
     samples = problem.sample(bare.lags)
     centres = centres_of_flight(
         samples, bare.correction, (bare.strength, bare.vertical), bare.noise
@@ -223,7 +228,7 @@ def fit_alike(problem: Problem, fit: MotorFit) -> MotorFit:
         Of a flight.
     """
     free = _groups(fit)
-    begin = _parameters_of(fit)
+    begin = parameters_of(fit, fit.lags)
     begin[MOTOR] = begin[SIZE:] = 0.0
     found = estimate(problem, free, start=begin, with_covariance=False)
     errors = errors_of(problem.sample(lags_of(found.parameters)), found.parameters)
@@ -257,6 +262,7 @@ def _of_flight(problem: Problem, found: FlightEstimate, free: int) -> MotorFit:
         u_low=float(np.quantile(samples.total, 0.02)),
         u_high=float(np.quantile(samples.total, 0.98)),
         count=len(samples),
+        numbers=problem.control.numbers,
     )
 
 

@@ -18,7 +18,9 @@ from magcomp.model import (
     FloatArray,
     IntArray,
     Lags,
+    MotorFit,
     Samples,
+    pack,
     unpack,
 )
 
@@ -98,7 +100,7 @@ def _rows(samples: Samples, parameters: FloatArray) -> tuple[FloatArray, FloatAr
         slopes[:, kind, FIELD_LAG] = np.einsum("ij,ij->i", turned, _cross(down, samples.down_rate))
     values = np.stack([np.einsum("ij,ij->i", axis, apart) for axis in axes], axis=1)
     values += slopes[:, :, NUISANCE] @ parameters[NUISANCE]
-    pulls = np.stack([one @ correction.motor[:, 0] for one in pulled], axis=1)
+    pulls = np.stack([one @ correction.vector for one in pulled], axis=1)
     centred = (earth - correction.added(samples.u)) @ inverse.T
     pulled_rate = correction.added(samples.u_rate)
     for kind, (axis, pull) in enumerate(zip(axes, pulled, strict=True)):
@@ -154,12 +156,31 @@ def _leaning(samples: Samples) -> FloatArray:
 def errors_of(samples: Samples, parameters: FloatArray) -> Noise | None:
     """The sizes of the errors at parameters near the solution, shape (SIZE,)."""
     values, _, pulls = _rows(samples, parameters)
-    return noise_of(values, pulls, float(np.std(samples.u[:, 0])))
+    return noise_of(values, pulls, float(np.std(samples.total)))
 
 
 def correction_at(parameters: FloatArray) -> Correction:
     """The correction among the parameters."""
     return unpack(np.delete(parameters, slice(CORRECTION_SIZE, SIZE)))
+
+
+def motor_columns(slopes: FloatArray) -> FloatArray:
+    """Derivatives by the motor vectors of all parts, shape (n, 2, k, 3)."""
+    others = slopes[:, :, SIZE:].reshape(*slopes.shape[:2], -1, 3)
+    return np.concatenate([slopes[:, :, None, MOTOR], others], axis=2)
+
+
+def parameters_of(fit: MotorFit, lags: Lags) -> FloatArray:
+    """The parameters of a fit at given lags, without tilt and lean, shape (SIZE + 3 (k − 1),)."""
+    packed = pack(fit.correction)
+    return np.concatenate(
+        [
+            packed[:CORRECTION_SIZE],
+            [fit.strength, fit.vertical / fit.strength, lags.field, lags.regressor],
+            np.zeros(SIZE - CORRECTION_SIZE - 4),
+            packed[CORRECTION_SIZE:],
+        ]
+    )
 
 
 def indices_of_correction(size: int) -> IntArray:

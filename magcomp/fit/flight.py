@@ -35,6 +35,7 @@ from magcomp.fit.field_model import (
     TILT,
     correction_at,
     errors_of,
+    indices_of_correction,
     lags_of,
     rows_of,
     strength_and_dip,
@@ -166,13 +167,14 @@ def prior(problem: Problem, free: int) -> Prior:
     """What is known before the data, with the first ``free`` groups of :data:`GROUPS` open."""
     present = problem.readings.in_force[-1].correction
     earth = problem.earth
-    mean = np.zeros(SIZE)
-    mean[:CORRECTION_SIZE] = pack(present)
+    size = SIZE + 3 * (problem.control.parts - 1)
+    mean = np.zeros(size)
+    mean[:CORRECTION_SIZE] = pack(present)[:CORRECTION_SIZE]
     mean[MOTOR] = 0.0
     mean[[STRENGTH, SIN_DIP]] = earth.strength, np.sin(earth.dip)
     mean[[FIELD_LAG, REGRESSOR_LAG]] = LAG_MEAN_S
-    width = np.zeros(SIZE)
-    width[MOTOR] = np.inf
+    width = np.zeros(size)
+    width[MOTOR] = width[SIZE:] = np.inf
     width[OFFSET] = OPEN_OFFSET_MGAUSS if free >= 2 else TRUSTED_OFFSET_MGAUSS
     width[DIAGONAL] = OPEN_SOFT_IRON if free >= 3 else 0.0
     width[OFF_DIAGONAL] = OPEN_SOFT_IRON if free >= 4 else 0.0
@@ -289,7 +291,7 @@ def with_wander(problem: Problem, found: FlightEstimate, free: int) -> tuple[Fli
     def rows(parameters: FloatArray) -> Rows:
         samples = problem.sample(lags_of(parameters))
         values, slopes, pulls = rows_of(samples, parameters, found.errors)
-        return Rows(samples.time, values, slopes, pulls * float(np.std(samples.u[:, 0])))
+        return Rows(samples.time, values, slopes, pulls * float(np.std(samples.total)))
 
     calibrated = is_calibrated(problem.readings.in_force[-1].correction)
     each: dict[int, Posterior] = {}
@@ -346,8 +348,9 @@ def estimate_lags(problem: Problem, correction: Correction) -> tuple[Lags, Lags]
     """
     known = prior(problem, 1)
     width, begin = known.width.copy(), known.mean.copy()
-    width[:CORRECTION_SIZE] = 0.0
-    begin[:CORRECTION_SIZE] = pack(correction)
+    among = indices_of_correction(len(begin))
+    width[among] = 0.0
+    begin[among] = pack(correction)
     found = solve(
         lambda p: strength_and_dip(problem.sample(lags_of(p)), p),
         begin,
@@ -362,7 +365,7 @@ def estimate_lags(problem: Problem, correction: Correction) -> tuple[Lags, Lags]
 def _doubt(known: Prior) -> Prior:
     """The prior with the trusted soft iron as uncertain as an ordinary calibration leaves it."""
     width = known.width.copy()
-    held = np.zeros(SIZE, dtype=bool)
+    held = np.zeros(len(width), dtype=bool)
     held[SOFT_IRON] = width[SOFT_IRON] == 0.0
     width[held] = TRUSTED_SOFT_IRON
     return Prior(known.mean, width)

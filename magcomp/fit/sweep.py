@@ -44,8 +44,7 @@ one that hovers never does."""
 STILL_SHARE = 0.02
 """Standing still, the control quantity explains the field but for this share of its strength."""
 
-_START, _SLOPE, _LAG = slice(0, 3), slice(3, 6), 6
-_SIZE = 7
+_START, _SLOPE, _LAG = slice(0, 3), slice(3, -1), -1
 _LAGS_TRIED = np.arange(-0.1, 0.501, 0.05)
 
 
@@ -59,7 +58,7 @@ def is_still(samples: Samples) -> bool:
     tilt = np.quantile(np.abs(samples.attitude[:, :2] - middle), 0.95, axis=0)
     if np.any(tilt > STILL_TILT_RAD) or _wobble(samples) > STILL_WOBBLE_RAD:
         return False
-    design = np.column_stack([np.ones(len(samples)), samples.total])
+    design = np.column_stack([np.ones(len(samples)), samples.u])
     line = np.linalg.lstsq(design, samples.raw, rcond=None)[0]
     left = np.linalg.norm(samples.raw - design @ line, axis=1)
     strength = float(np.median(np.linalg.norm(samples.present, axis=1)))
@@ -97,7 +96,8 @@ def fit_sweep(problem: Problem, *, lag: float | None = None) -> MotorFit:
     docs/method.md, Sweeps: at rest only the hard iron moves. A slope g of the raw field becomes
     MOT = −s · D · g (docs/autopilots.md, ArduPilot: correction).
     """
-    begin = np.zeros(_SIZE)
+    parts = problem.control.parts
+    begin = np.zeros(4 + 3 * parts)
     begin[_LAG] = _nearest_lag(problem) if lag is None else lag
     at_start = problem.sample(Lags(0.0, float(begin[_LAG])))
     if not np.ptp(at_start.total) > 0.0:
@@ -105,23 +105,22 @@ def fit_sweep(problem: Problem, *, lag: float | None = None) -> MotorFit:
             f"The {problem.control.kind} must change during a sweep; instead it stayed at "
             f"{at_start.total[0]:.2f}"
         )
-    design = np.column_stack([np.ones(len(at_start)), at_start.total])
-    begin[:6] = np.linalg.lstsq(design, at_start.raw, rcond=None)[0].reshape(-1)
-    width = np.full(_SIZE, np.inf)
+    design = np.column_stack([np.ones(len(at_start)), at_start.u])
+    begin[:_LAG] = np.linalg.lstsq(design, at_start.raw, rcond=None)[0].reshape(-1)
+    width = np.full(len(begin), np.inf)
     width[_LAG] = LAG_WIDTH_S if lag is None else 0.0
     mean = begin.copy()
     mean[_LAG] = LAG_MEAN_S if lag is None else lag
 
     def residuals(parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
         rows = problem.sample(Lags(0.0, float(parameters[_LAG])))
-        left = rows.raw - parameters[_START] - np.multiply.outer(rows.total, parameters[_SLOPE])
-        slopes = np.zeros((len(rows), 3, _SIZE))
+        vectors = parameters[_SLOPE].reshape(parts, 3)
+        left = rows.raw - parameters[_START] - rows.u @ vectors
+        slopes = np.zeros((len(rows), 3, len(begin)))
         for axis in range(3):
             slopes[:, axis, axis] = -1.0
-            slopes[:, axis, 3 + axis] = -rows.total
-        slopes[:, :, _LAG] = rows.raw_rate + np.multiply.outer(
-            rows.u_rate[:, 0], parameters[_SLOPE]
-        )
+            slopes[:, axis, 3 + axis : _LAG : 3] = -rows.u
+        slopes[:, :, _LAG] = rows.raw_rate + rows.u_rate @ vectors
         return left, slopes
 
     found = solve(
@@ -139,7 +138,7 @@ def _nearest_lag(problem: Problem) -> float:
 
     def left(lag: float) -> float:
         rows = problem.sample(Lags(0.0, lag))
-        design = np.column_stack([np.ones(len(rows)), rows.total])
+        design = np.column_stack([np.ones(len(rows)), rows.u])
         line = np.linalg.lstsq(design, rows.raw, rcond=None)[0]
         return float(np.sum(np.abs(rows.raw - design @ line)))
 
@@ -156,12 +155,17 @@ def _answer(
     problem: Problem, parameters: FloatArray, covariance: FloatArray, noise: float
 ) -> MotorFit:
     present = problem.readings.in_force[-1].correction
-    shape, slope = present.soft_iron, parameters[_SLOPE]
+    shape, slope = present.soft_iron, parameters[_SLOPE].reshape(-1, 3)
+    parts = len(slope)
     samples = problem.sample(Lags(0.0, float(parameters[_LAG])))
-    correction = Correction(present.offset, shape, -shape @ slope)
-    full = np.diag(_unseen_variance(present))
-    doubt = TRUSTED_SOFT_IRON**2 * float(slope @ slope) * np.eye(3)
-    full[MOTOR, MOTOR] = shape @ covariance[_SLOPE, _SLOPE] @ shape.T + doubt
+    correction = Correction(present.offset, shape, -shape @ slope.T)
+    full = np.zeros((CORRECTION_SIZE + 3 * (parts - 1),) * 2)
+    full[:CORRECTION_SIZE, :CORRECTION_SIZE] = np.diag(_unseen_variance(present))
+    doubt = np.repeat(TRUSTED_SOFT_IRON**2 * np.sum(slope**2, axis=1), 3)
+    shapes = np.kron(np.eye(parts), shape)
+    of_motors = np.r_[MOTOR, CORRECTION_SIZE : len(full)]
+    full[np.ix_(of_motors, of_motors)] = shapes @ covariance[_SLOPE, _SLOPE] @ shapes.T
+    full[of_motors, of_motors] += doubt
     corrected = correction.apply(samples.raw, samples.u)
     levels = _levels(problem, samples, parameters, present, noise)
     return MotorFit(
@@ -186,6 +190,7 @@ def _answer(
         u_low=float(np.quantile(samples.total, 0.02)),
         u_high=float(np.quantile(samples.total, 0.98)),
         count=len(samples),
+        numbers=problem.control.numbers,
     )
 
 

@@ -14,24 +14,20 @@ import numpy as np
 
 from magcomp.fit import Problem
 from magcomp.fit.field_model import (
-    FIELD_LAG,
-    REGRESSOR_LAG,
     SIN_DIP,
-    SIZE,
     STRENGTH,
+    motor_columns,
+    parameters_of,
     strength_and_dip,
 )
 from magcomp.fit.flight import drift_blocks, prior
 from magcomp.fit.robust import spread_of, time_blocks
 from magcomp.model import (
-    CORRECTION_SIZE,
-    MOTOR,
     OFFSET,
     FloatArray,
     IntArray,
     Lags,
     MotorFit,
-    pack,
 )
 
 _SPLITS = (0.2, 0.35, 0.5, 0.65, 0.8)
@@ -148,17 +144,13 @@ def departures_of(problem: Problem, fit: MotorFit, lags: Lags) -> tuple[Departur
         To look at the readings with.
     """
     samples = problem.sample(lags)
-    parameters = np.zeros(SIZE)
-    parameters[:CORRECTION_SIZE] = pack(fit.correction)
-    parameters[[STRENGTH, SIN_DIP]] = fit.strength, fit.vertical / fit.strength
-    parameters[[FIELD_LAG, REGRESSOR_LAG]] = lags.field, lags.regressor
-    values, slopes = strength_and_dip(samples, parameters)
+    values, slopes = strength_and_dip(samples, parameters_of(fit, lags))
     linear = _weighted(problem, values, slopes)
     horizontal = float(np.sqrt(max(fit.strength**2 - fit.vertical**2, 1.0)))
     top = float(np.quantile(samples.total, 0.98))
     if top <= 0.0:
         return ()
-    weight = linear.slopes[:, :, OFFSET], linear.slopes[:, :, MOTOR] / top
+    weight = linear.slopes[:, :, OFFSET], motor_columns(linear.slopes).sum(axis=2) / top
     share = np.clip(samples.total / top, 0.0, 2.0)[:, None, None]
     wide = _WIDEST * fit.strength
     curved, covariance, gain = linear.taken_up(weight[1] * share, wide)

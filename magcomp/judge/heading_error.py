@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from magcomp.align import interpolate
+from magcomp.fit.nearest import moved, nearest
 from magcomp.geometry import body_from_earth, heading_shift, level_matrix, wrap_angle
 from magcomp.model import (
     CORRECTION_SIZE,
@@ -17,6 +18,7 @@ from magcomp.model import (
     Correction,
     FloatArray,
     HeadingError,
+    InForce,
     MotorFit,
     Samples,
     quantity_of,
@@ -66,11 +68,29 @@ def multiplied_in_force(
     -----
     Another quantity than the fit's own is taken as a straight line of it, as the recording shows.
     """
-    if kind in (None, fit.regressor) or kind not in controls:
+    if kind in (None, fit.regressor) or kind not in controls or controls[kind].parts > 1:
         return u
     other = interpolate(controls[kind].series, samples.time - samples.lags.regressor)
     slope, intercept = np.polyfit(samples.total, other, 1)
     return np.asarray(np.maximum(intercept + slope * u, 0.0))
+
+
+def present_by(present: InForce, controls: Mapping[str, Control], samples: Samples) -> Correction:
+    """The correction in force; one motor by motor as the nearest by the fit's own quantity.
+
+    Parameters
+    ----------
+    present
+        What is in force.
+    controls, samples
+        As for :func:`multiplied_in_force`.
+    """
+    known = controls.get(present.regressor or "")
+    if known is None or known.parts == 1:
+        return present.correction
+    then = samples.time - samples.lags.regressor
+    added = present.correction.added(present.multiplied(interpolate(known.series, then)))
+    return moved(present.correction, nearest(added, samples.total[:, None])[0])
 
 
 def heading_errors(
@@ -105,7 +125,7 @@ def heading_errors(
     roll, pitch, yaw = attitudes()
     field = _field_at(fit, roll, pitch, yaw)
     draws = rng.multivariate_normal(
-        np.zeros(CORRECTION_SIZE), fit.covariance, size=_DRAWS, method="eigh"
+        np.zeros(CORRECTION_SIZE), fit.shared_covariance, size=_DRAWS, method="eigh"
     )
     inverse = np.linalg.inv(fit.correction.soft_iron)
     rows = []

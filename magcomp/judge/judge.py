@@ -12,9 +12,15 @@ from magcomp.fit import Problem
 from magcomp.judge.evidence import cover, field_residual, used_lags
 from magcomp.judge.finding import Finding, severity
 from magcomp.judge.gates import on_control, on_turn, on_unseen_parameters
-from magcomp.judge.heading_error import control_grid, heading_errors, multiplied_in_force
+from magcomp.judge.heading_error import (
+    control_grid,
+    heading_errors,
+    multiplied_in_force,
+    present_by,
+)
 from magcomp.judge.keep import is_close, keep
 from magcomp.judge.lacking import lacking
+from magcomp.judge.motors import on_motors
 from magcomp.judge.thresholds import Thresholds
 from magcomp.judge.whole import on_constancy, on_earth
 from magcomp.model import (
@@ -86,13 +92,12 @@ def judge(
     table = partial(
         heading_errors,
         fit,
-        in_force.correction,
+        present_by(in_force, problem.in_force, samples),
         multiplied_in_force(control_grid(fit), in_force.regressor, fit, problem.in_force, samples),
     )
     errors = table(rng)
-    stays = in_force.regressor in (None, fit.regressor) and is_close(
-        fit, in_force.correction, errors
-    )
+    alike = in_force.regressor in (None, fit.regressor) and problem.control.parts == 1
+    stays = alike and is_close(fit, in_force.correction, errors)
     if stays:
         errors = table(rng, keep=True)
         residual = replace(residual, after=residual.before, held_out=residual.held_out_before)
@@ -102,6 +107,7 @@ def judge(
         *on_earth(problem, samples, fit),
         *on_constancy(problem, fit, limits, _worst_flown(fit, errors).p95),
         *on_unseen_parameters(in_force.unseen),
+        *on_motors(fit, covered, limits),
         *_findings(fit, errors, residual, (samples, covered), limits),
     ]
     grade = max((f.grade for f in findings), key=severity, default=Grade.GOOD)
@@ -123,22 +129,22 @@ def _widened(fit: MotorFit, motors: FloatArray) -> MotorFit:
     """
     count = len(motors)
     jackknife = (count - 1) / count * np.sum((motors - motors.mean(axis=0)) ** 2, axis=0)
-    stated = np.maximum(np.diag(fit.covariance)[MOTOR], 1e-18)
+    stated = np.maximum(np.diag(fit.shared_covariance)[MOTOR], 1e-18)
     factor = max(1.0, float(np.mean(jackknife / stated))) if fit.method != "flight" else 1.0
-    scale = np.full(CORRECTION_SIZE, np.sqrt(factor) * UNSEEN)
+    scale = np.full(len(fit.covariance), np.sqrt(factor) * UNSEEN)
     if fit.method == "sweep":
         # What a vehicle at rest cannot show does not scatter between its folds either.
-        scale[MOTOR.stop :] = 1.0
+        scale[MOTOR.stop : CORRECTION_SIZE] = 1.0
     widened = fit.covariance * np.outer(scale, scale) + np.diag(_floor(fit) ** 2)
     return replace(fit, covariance=widened)
 
 
 def _floor(fit: MotorFit) -> FloatArray:
-    """Standard errors that no residual shows, of the 12 parameters."""
+    """Standard errors that no residual shows, one a parameter."""
     bent = not quantity_of(fit.regressor).is_straight and fit.method == "flight"
     motor = (FLOOR_THROTTLE if bent else FLOOR_MOTOR) * float(np.linalg.norm(fit.correction.vector))
-    floor = np.full(CORRECTION_SIZE, FLOOR_SOFT_IRON)
-    floor[MOTOR] = motor
+    floor = np.full(len(fit.covariance), FLOOR_SOFT_IRON)
+    floor[MOTOR] = floor[CORRECTION_SIZE:] = motor
     floor[OFFSET] = np.hypot(FLOOR_OFFSET_MGAUSS, motor * fit.u_high / 2.0 if bent else 0.0)
     return floor
 

@@ -41,7 +41,7 @@ def is_close(fit: MotorFit, present: Correction, errors: Sequence[HeadingError])
 def _is_likely(fit: MotorFit, motor: FloatArray) -> bool:
     """Whether the motor vector in force lies within what the fit allows."""
     apart = motor - fit.correction.vector
-    inverse = np.linalg.pinv(fit.covariance[MOTOR, MOTOR], hermitian=True)
+    inverse = np.linalg.pinv(fit.shared_covariance[MOTOR, MOTOR], hermitian=True)
     return float(apart @ inverse @ apart) <= _CHI2_95_OF_3
 
 

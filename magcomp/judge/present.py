@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from magcomp.fit import (
@@ -16,7 +18,7 @@ from magcomp.geometry import body_from_earth
 from magcomp.judge.evidence import cover
 from magcomp.judge.finding import Finding, severity
 from magcomp.judge.gates import on_control, on_duration, on_turn, on_unseen_parameters
-from magcomp.judge.heading_error import attitudes, largest_shift
+from magcomp.judge.heading_error import attitudes, largest_shift, present_by
 from magcomp.judge.thresholds import Thresholds
 from magcomp.model import (
     Correction,
@@ -64,7 +66,11 @@ def judge_present(
     limits = Thresholds() if thresholds is None else thresholds
     require_readings(problem.readings)
     samples = problem.sample(problem.usual_lags())
-    present = problem.readings.in_force[-1].correction
+    in_force = problem.readings.in_force[-1]
+    present = present_by(in_force, problem.in_force, samples)
+    if present is not in_force.correction:
+        # Told by one quantity, it must still correct every reading as the firmware did.
+        samples = replace(samples, raw=present.undo(samples.present, samples.u))
     middle = np.median(departures(samples.present, samples.down, 0.0, 0.0), axis=0)
     earth = (float(middle[0]), float(middle[1]))
     left = departures(samples.present, samples.down, *earth)

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from magcomp.align import controls, expected_earth, readings, reported
+from magcomp.align import controls, expected_earth, readings, to_undo
 from magcomp.errors import MagcompError
 from magcomp.fit import Problem, refit
 from magcomp.model import Analysis, MotorFit, Recording
@@ -49,7 +49,7 @@ def refresh(
         control = next((c for c in like if c.origin == before.origin), like[0])
         try:
             new = readings(recording, before.compass)
-            problem = Problem(new, control, reported(found), earth)
+            problem = Problem(new, control, to_undo(recording, found), earth)
             # Fewer than ``new``: those in a gap of the control quantity are left out.
             count = len(problem.readings)
             keep = np.zeros(count, dtype=bool)

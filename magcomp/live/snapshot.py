@@ -231,7 +231,8 @@ def _corrected(field: Vector, now: Now, present: InForce, fit: MotorFit) -> Vect
 
 def _control(regressor: str | None, now: Now) -> float | None:
     """What the vehicle says of a control quantity."""
-    return quantity_of(regressor).of(current=now.current, throttle=now.throttle)
+    quantity = quantity_of(regressor)
+    return quantity.of(current=now.current, throttle=now.throttle) if quantity.is_told else None
 
 
 def _heading_deg(field: Vector, now: Now) -> float | None:

@@ -22,8 +22,18 @@ from magcomp.model.fit import (
     symmetric,
     unpack,
 )
+from magcomp.model.forms import AsWritten, Form
 from magcomp.model.parameters import ParameterSet
-from magcomp.model.quantity import CURRENT, QUANTITIES, THROTTLE, Quantity, quantity_of, unit_of
+from magcomp.model.quantity import (
+    CURRENT,
+    DRIVE,
+    MOTORS,
+    QUANTITIES,
+    THROTTLE,
+    Quantity,
+    quantity_of,
+    unit_of,
+)
 from magcomp.model.recording import (
     SPEED_CONTROLLERS,
     Applied,
@@ -51,7 +61,9 @@ from magcomp.model.samples import (
 __all__ = [
     "CORRECTION_SIZE",
     "CURRENT",
+    "DRIVE",
     "MOTOR",
+    "MOTORS",
     "OFFSET",
     "QUANTITIES",
     "SOFT_IRON",
@@ -59,6 +71,7 @@ __all__ = [
     "THROTTLE",
     "Analysis",
     "Applied",
+    "AsWritten",
     "BoolArray",
     "Compass",
     "CompassResult",
@@ -67,6 +80,7 @@ __all__ = [
     "Coverage",
     "FieldResidual",
     "FloatArray",
+    "Form",
     "Grade",
     "HeadingError",
     "InForce",

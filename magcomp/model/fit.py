@@ -8,6 +8,7 @@ from enum import StrEnum
 
 import numpy as np
 
+from magcomp.model.forms import AsWritten, Form
 from magcomp.model.recording import FloatArray, Vehicle
 from magcomp.model.samples import Correction, Lags
 
@@ -152,6 +153,12 @@ class MotorFit:
     kept
         Whether the correction is the one that was in force, because the data cannot tell it from
         a better one.
+    numbers
+        Of which motor each part of the control quantity is; empty where it has one part.
+    told_apart
+        Covariance of how the motors' vectors differ, as the recording alone tells it,
+        (mGauss per unit)², shape (3 (k − 1), 3 (k − 1)); empty where the control quantity has one
+        part.
     """
 
     compass: int
@@ -173,6 +180,8 @@ class MotorFit:
     u_high: float
     count: int
     kept: bool = False
+    numbers: tuple[int, ...] = ()
+    told_apart: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
 
     @property
     def interference(self) -> FloatArray:
@@ -182,7 +191,32 @@ class MotorFit:
     @property
     def interference_std(self) -> FloatArray:
         """Standard errors of :attr:`interference`, shape (3,)."""
-        return np.asarray(np.sqrt(np.diag(self.covariance)[MOTOR]))
+        return np.asarray(np.sqrt(np.diag(self.shared_covariance)[MOTOR]))
+
+    @property
+    def by_motor(self) -> tuple[tuple[int, FloatArray, FloatArray], ...]:
+        """Number of each motor, what it adds, mGauss per unit, (3,), and its standard errors."""
+        std = np.sqrt(np.diag(self.covariance))
+        each = np.vstack([std[MOTOR], std[CORRECTION_SIZE:].reshape(-1, 3)])
+        return (
+            tuple(zip(self.numbers, -self.correction.motor.T, each, strict=True))
+            if (self.numbers)
+            else ()
+        )
+
+    @property
+    def shared_covariance(self) -> FloatArray:
+        """Covariance where all parts share the total alike, shape (12, 12).
+
+        Of the 12 parameters ``Correction.vector``, offset and soft iron: :attr:`covariance` itself
+        where the control quantity has one part.
+        """
+        parts = self.correction.motor.shape[1]
+        mean = np.zeros((CORRECTION_SIZE, len(self.covariance)))
+        mean[:, :CORRECTION_SIZE] = np.eye(CORRECTION_SIZE)
+        mean[MOTOR, MOTOR] /= parts
+        mean[MOTOR, CORRECTION_SIZE:] = np.tile(np.eye(3) / parts, parts - 1)
+        return np.asarray(mean @ self.covariance @ mean.T)
 
 
 class Grade(StrEnum):
@@ -303,6 +337,10 @@ class CompassResult:
     left_out
         What would be written for this compass if its fit is not, though another compass's is: one
         switch may serve all compasses.
+    forms
+        What the field may follow, compared on unseen data; empty where only one was tried.
+    as_written
+        What the firmware can apply of the fit, where that is not the fit itself.
     """
 
     fit: MotorFit
@@ -311,6 +349,8 @@ class CompassResult:
     parameters: Mapping[str, float]
     insisted: Mapping[str, float] = field(default_factory=dict)
     left_out: Mapping[str, float] = field(default_factory=dict)
+    forms: tuple[Form, ...] = ()
+    as_written: AsWritten | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ asks :func:`quantity_of`.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -18,6 +18,11 @@ Told = TypeVar("Told")
 
 THROTTLE = "throttle"
 CURRENT = "current"
+MOTORS = "motors"
+"""The current of each motor."""
+
+DRIVE = "motor outputs"
+"""What drives each motor: its duty times the battery's voltage."""
 
 _MOST_ROWS = 50
 
@@ -54,6 +59,12 @@ class Quantity:
         Below this a copter does not leave the ground.
     how_to_vary
         What to do so that it varies more.
+    single
+        The quantity of one part that comes nearest.
+    how_to_have
+        How a log comes to hold it, behind a sentence that says it is not there.
+    is_told
+        Whether it can be told from one reading of throttle and battery current.
     """
 
     name: str
@@ -70,6 +81,9 @@ class Quantity:
     idle: float
     flies: float
     how_to_vary: str
+    single: str
+    how_to_have: str = ""
+    is_told: bool = True
 
     def text(self, u: float) -> str:
         """A value with its unit.
@@ -131,6 +145,7 @@ _AMPERES = Quantity(
     idle=1.0,
     flies=0.0,
     how_to_vary="fly climbs and descents so that the motors work harder and less hard",
+    single=CURRENT,
 )
 _SHARE = Quantity(
     name=THROTTLE,
@@ -147,9 +162,22 @@ _SHARE = Quantity(
     idle=-np.inf,
     flies=0.3,
     how_to_vary="fly climbs and descents",
+    single=THROTTLE,
 )
 
-QUANTITIES: Mapping[str, Quantity] = {each.name: each for each in (_AMPERES, _SHARE)}
+_EACH = replace(_AMPERES, name=MOTORS)
+_DRIVEN = replace(
+    _AMPERES,
+    name=DRIVE,
+    unit="V",
+    shown_unit="V",
+    is_told=False,
+    how_to_have=": it takes SERVO_OUTPUT_RAW (or RCOU) and the battery's voltage",
+)
+
+QUANTITIES: Mapping[str, Quantity] = {
+    each.name: each for each in (_AMPERES, _SHARE, _EACH, _DRIVEN)
+}
 """By name."""
 
 

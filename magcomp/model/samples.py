@@ -97,11 +97,14 @@ class Control:
         The quantity, shape (n,), or its parts, shape (n, k), in the quantity's unit.
     origin
         In words: which messages it was made of.
+    numbers
+        Of which motor each part is, as the firmware counts them; empty where there is one part.
     """
 
     kind: str
     series: Series
     origin: str
+    numbers: tuple[int, ...] = ()
 
     @property
     def parts(self) -> int:
@@ -129,11 +132,21 @@ class InForce:
     unseen
         Parameters that act on the readings and of which the recording does not tell the value;
         the firmware's defaults stand for them.
+    exponent
+        The control quantity's parts are raised to it before they are multiplied.
     """
 
     correction: Correction
     regressor: str | None
     unseen: tuple[str, ...] = ()
+    exponent: float = 1.0
+
+    def multiplied(self, u: FloatArray) -> FloatArray:
+        """What the motor vectors multiply at given values of the control quantity, same shape."""
+        if u.ndim == 1:
+            return u
+        parts = u[:, : self.correction.motor.shape[1]]
+        return np.asarray(np.maximum(parts, 0.0) ** self.exponent)
 
 
 @dataclass(frozen=True, eq=False)

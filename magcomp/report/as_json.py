@@ -145,6 +145,27 @@ def _compass(result: CompassResult) -> dict[str, Any]:
         "noise_mgauss": fit.noise,
         "kept": fit.kept,
         "count": fit.count,
+        "motors": [
+            {"motor": number, "interference_mgauss": vector, "std_mgauss": std}
+            for number, vector, std in fit.by_motor
+        ],
+        "forms": [
+            {
+                "form": form.name,
+                "numbers": form.count,
+                "held_out_mgauss": form.held_out,
+                "left_deg": form.left_deg,
+                "best": form.is_best,
+            }
+            for form in result.forms
+        ],
+        "as_written": None
+        if result.as_written is None
+        else {
+            "regressor": result.as_written.regressor,
+            "exponent": result.as_written.exponent,
+            "left_deg": result.as_written.left_deg,
+        },
         "parameters": dict(result.parameters),
         "verdict": verdict.grade.value,
         "reasons": list(verdict.reasons),

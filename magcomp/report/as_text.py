@@ -314,6 +314,11 @@ def evidence(analysis: Analysis, *, verbose: bool = True) -> Iterator[Renderable
     """What was found and what it rests on, a column a compass; statistics where verbose."""
     yield Text()
     yield tables.evidence(analysis.compasses, verbose=verbose)
+    if analysis.compasses[0].fit.numbers:
+        yield tables.motors(analysis.compasses)
+    compared = [result for result in analysis.compasses if result.forms]
+    if compared and (verbose or not all(result.forms[0].is_best for result in compared)):
+        yield tables.forms(compared)
     yield Text()
     for why, numbers in _by_method(analysis.compasses).items():
         of = "" if len(numbers) == len(analysis.compasses) else f"{words.compasses(numbers)}: "

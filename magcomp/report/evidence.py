@@ -11,12 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from magcomp.align import controls, readings, reported, sample
+from magcomp.align import controls, currents_of_motors, readings, sample, to_undo
 from magcomp.errors import MissingDataError
 from magcomp.fit import departures, residuals
 from magcomp.geometry import heading
 from magcomp.judge.evidence import used_lags
-from magcomp.judge.heading_error import level_errors, multiplied_in_force
+from magcomp.judge.heading_error import level_errors, multiplied_in_force, present_by
 from magcomp.model import (
     CompassResult,
     Control,
@@ -159,7 +159,12 @@ def compass_plots(
         count=len(samples),
         rate_hz=float(1.0 / np.median(steps)) if len(steps) else np.nan,
         longest_gap_s=float(steps.max()) if len(steps) else np.nan,
-        level_errors=level_errors(fit, present.correction, float(quoted[0]), float(multiplied[0])),
+        level_errors=level_errors(
+            fit,
+            present_by(present, in_force, samples),
+            float(quoted[0]),
+            float(multiplied[0]),
+        ),
         strip=strip(recording, samples.time),
     )
 
@@ -169,8 +174,9 @@ def _samples(
 ) -> tuple[Samples, InForce, Mapping[str, Control]]:
     """The readings as the fit saw them, what was in force at their end, and what it multiplies."""
     found = controls(recording)
-    control = _control(found, fit, recording.source)
-    in_force = {**reported(found), control.kind: control}
+    forms = currents_of_motors(recording) if fit.numbers else found
+    control = _control(forms, fit, recording.source)
+    in_force = {**to_undo(recording, found), control.kind: control}
     new = readings(recording, fit.compass, start=start, end=end)
     return sample(new, control, in_force, used_lags(fit)), new.in_force[-1], in_force
 

@@ -12,7 +12,7 @@ from rich.text import Text
 
 from magcomp import autopilots
 from magcomp.autopilots import Kind
-from magcomp.model import CompassResult, MotorFit, Verdict, quantity_of
+from magcomp.model import CompassResult, Form, MotorFit, Verdict, quantity_of
 from magcomp.report import words
 from magcomp.report.by_width import ByWidth
 
@@ -75,6 +75,34 @@ def evidence(results: Sequence[CompassResult], *, verbose: bool = True) -> ByWid
         _statistics(columns, fits, verdicts)
     _coverage(columns, verdicts, regressor)
     return ByWidth(columns.tables)
+
+
+def motors(results: Sequence[CompassResult]) -> ByWidth:
+    """What each motor adds, a row an axis of a motor; nothing where the motors were not fitted."""
+    columns = _Columns([result.fit.compass for result in results])
+    for index, number in enumerate(results[0].fit.numbers):
+        columns.section(f"motor {number} adds, mGauss per A")
+        for axis, name in enumerate(words.AXES):
+            told = (result.fit.by_motor[index] for result in results)
+            columns.row(name, (words.with_std(float(v[axis]), float(s[axis])) for _, v, s in told))
+    return ByWidth(columns.tables)
+
+
+def forms(results: Sequence[CompassResult]) -> ByWidth:
+    """What the field may follow: left unexplained on unseen data, and heading it costs."""
+    columns = _Columns([result.fit.compass for result in results])
+    columns.section("left unseen, mGauss")
+    for row, form in enumerate(results[0].forms):
+        name = f"{form.name} ({form.count})"
+        columns.row(name, (_form(result.forms[row]) for result in results))
+    return ByWidth(columns.tables)
+
+
+def _form(form: Form) -> str:
+    if form.is_best:
+        return f"{form.held_out:.1f}, best"
+    costs = f", {words.degrees(form.left_deg)}" if math.isfinite(form.left_deg) else ""
+    return f"{form.held_out:.1f}{costs}"
 
 
 def _statistics(columns: _Columns, fits: Sequence[MotorFit], verdicts: Sequence[Verdict]) -> None:

@@ -68,9 +68,12 @@ class Flight:
         Same seed, same flight.
     duration_s
         From power-up to disarmed on the ground.
+    vigour
+        How hard the motors work against each other, for brisk turns and tilts; 1 is an ordinary
+        flight.
     """
 
-    def __init__(self, seed: int, duration_s: float = 240.0) -> None:
+    def __init__(self, seed: int, duration_s: float = 240.0, *, vigour: float = 1.0) -> None:
         rng = np.random.default_rng([seed, 2])
         self._duration = duration_s
         self._north = Waves(rng, 22.0, 60.0, 12.0)
@@ -81,6 +84,7 @@ class Flight:
         self._wind = [Waves(rng, 2.0, 30.0, 1.5) for _ in range(2)]
         self._steady_wind = rng.uniform(-3.0, 3.0, 2)
         self._jitter = [Waves(rng, 0.015, 1.5, 0.2, count=10) for _ in range(4)]
+        self._vigour = vigour
         self._trim = rng.normal(scale=0.01, size=3)
 
     @property
@@ -142,7 +146,7 @@ class Flight:
 
     def _mix(self, time: FloatArray, pose: FloatArray, air: FloatArray) -> FloatArray:
         """What keeps the attitude: trim, the pitching moment of the airspeed, yaw torque."""
-        roll, pitch, yaw = (wave(time) for wave in self._jitter[:3])
+        roll, pitch, yaw = (self._vigour * wave(time) for wave in self._jitter[:3])
         forward = np.einsum("ni,ni->n", pose[:, :, 0], air)
         sideways = np.einsum("ni,ni->n", pose[:, :, 1], air)
         headings = [self._heading(time + shift) for shift in (-_STEP, 0.0, _STEP)]

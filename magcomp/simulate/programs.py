@@ -12,12 +12,13 @@ from magcomp.simulate.flight import Flight
 from magcomp.simulate.mission import Mission
 from magcomp.simulate.motion import Program
 from magcomp.simulate.timeline import paper_turntable, parked, sweep, turntable
-from magcomp.simulate.truth import BATTERY, PAPER_BENCH, Power, Truth, draw_truth
+from magcomp.simulate.truth import BATTERY, MOTOR_SPREAD, PAPER_BENCH, Power, Truth, draw_truth
 
 Compensation = Literal["off", "wrong", "exact"]
 
 _STABILIZE, _AUTO, _LOITER = 0, 3, 5
 _STRONG = 9.0
+_BRISK = 5.0
 
 
 @dataclass(frozen=True)
@@ -58,6 +59,7 @@ _RECIPES: Mapping[str, _Recipe] = {
     ),
     "sweep": _Recipe("sweep", True, _STABILIZE, sweep),
     "flight": _Recipe("flight", True, _LOITER, Flight),
+    "brisk": _Recipe("flight", True, _LOITER, partial(Flight, vigour=_BRISK)),
     "parked": _Recipe("parked", True, _STABILIZE, lambda _: parked()),
     "mission": _Recipe("mission", True, _AUTO, lambda _: Mission(), strength=_STRONG),
 }
@@ -72,6 +74,7 @@ def scenario(
     *,
     calibrated: bool | None = None,
     compensation: Compensation = "off",
+    motor_spread: float | None = None,
 ) -> Scenario:
     """Draw the vehicle of a programme.
 
@@ -86,6 +89,9 @@ def scenario(
         not on a turntable, else yes.
     compensation
         The motor compensation in force at boot.
+    motor_spread
+        How unequally the motors' wires disturb, as a share of the interference; None takes what
+        is usual, a twentieth.
 
     Raises
     ------
@@ -105,5 +111,6 @@ def scenario(
         compensation=compensation,
         strength=recipe.strength,
         power=recipe.power,
+        motor_spread=MOTOR_SPREAD if motor_spread is None else motor_spread,
     )
     return Scenario(truth, partial(recipe.begin, seed), recipe.mode)

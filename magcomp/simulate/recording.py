@@ -50,6 +50,7 @@ def write_tlog(
     seed: int = 1,
     calibrated: bool | None = None,
     compensation: Compensation = "off",
+    motor_spread: float | None = None,
     parameters: Mapping[str, float] | None = None,
     rates: Mapping[int, float] | None = None,
     autopilot: str = "ardupilot",
@@ -61,7 +62,7 @@ def write_tlog(
     ----------
     path
         The .tlog; overwritten.
-    program, seed, calibrated, compensation
+    program, seed, calibrated, compensation, motor_spread
         See :func:`magcomp.simulate.programs.scenario`.
     parameters
         Parameters that differ at boot, for example ``{"BATT_MONITOR": 0}``.
@@ -82,7 +83,13 @@ def write_tlog(
     OutputError
         Where the file cannot be written.
     """
-    chosen = scenario(program, seed, calibrated=calibrated, compensation=compensation)
+    chosen = scenario(
+        program,
+        seed,
+        calibrated=calibrated,
+        compensation=compensation,
+        motor_spread=motor_spread,
+    )
     vehicle = Vehicle(chosen, start_unix_s=start_unix_s, parameters=parameters, autopilot=autopilot)
     if rates is None:
         rates = PX4_RATES if autopilot == "px4" else DEFAULT_RATES

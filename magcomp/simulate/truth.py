@@ -24,7 +24,7 @@ MOTORS = 4
 
 # With a larger spread no single vector could keep the heading within 0.4° over 0 … 50 A:
 # what one motor does differently would be the error, and not the fit.
-_MOTOR_SPREAD = 0.05
+MOTOR_SPREAD = 0.05
 
 _HOMES = (
     (47.3977, 8.5456, 488.0),
@@ -226,6 +226,7 @@ def draw_truth(
     compensation: str = "off",
     strength: float | None = None,
     power: Power = BATTERY,
+    motor_spread: float = MOTOR_SPREAD,
 ) -> Truth:
     """Draw a vehicle.
 
@@ -243,6 +244,8 @@ def draw_truth(
         Length of the interference vector, mGauss/A; drawn between 1.5 and 3.5 where None.
     power
         Battery and motors.
+    motor_spread
+        How unequally the motors' wires disturb, as a share of the interference.
     """
     rng = np.random.default_rng([seed, 0])
     home = _HOMES[int(rng.integers(len(_HOMES)))]
@@ -250,7 +253,7 @@ def draw_truth(
     direction /= np.linalg.norm(direction)
     length = rng.uniform(1.5, 3.5) if strength is None else strength
     interference = np.round(direction * length, 4)
-    spread = rng.normal(scale=_MOTOR_SPREAD * length, size=(MOTORS, 3))
+    spread = rng.normal(scale=motor_spread * length, size=(MOTORS, 3))
     compasses = tuple(
         CompassTruth(
             offset=np.round(rng.uniform(-150, 150, 3), 2),

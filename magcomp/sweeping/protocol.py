@@ -81,6 +81,7 @@ class SweepSequence:
         self._limits = limits or Limits()
         self._watch = StillWatch(self._limits)
         self._resting, self._drawing = CurrentMean(), CurrentMean()
+        self._rest_a = math.inf
         self._events: list[Event] = []
         self._done: list[Measured] = []
         self._step: Step | None = None
@@ -209,13 +210,17 @@ class SweepSequence:
         """Note what a step drew, where it was carried out whole."""
         if self.stage is not Stage.SPIN or entered is not Stage.HALT or self._ending is not None:
             return
-        drawn, rest = self._drawing.amperes, self._resting.amperes
+        drawn = self._drawing.amperes
+        if self._resting.amperes is not None:
+            # A monitor that smooths still tells the step before; the least it told is the truest.
+            self._rest_a = min(self._rest_a, self._resting.amperes)
         if drawn is None or self._step is None:
             why = "the vehicle must tell its battery's current; instead none came during a step"
             self._ending = Stopping(Reason.NO_CURRENT, why)
             self._events.append(self._ending)
             return
-        measured = Measured(self._step, drawn - (rest or 0.0))
+        rest = self._rest_a if math.isfinite(self._rest_a) else 0.0
+        measured = Measured(self._step, drawn - rest)
         self._done.append(measured)
         self._events.append(Told(measured))
 

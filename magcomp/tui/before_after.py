@@ -182,7 +182,8 @@ def _u(in_force: InForce, live: LiveSnapshot) -> float | None:
     """What the autopilot multiplies by; 0 where its compensation is off, None where not known."""
     if in_force.regressor is None:
         return 0.0
-    return quantity_of(in_force.regressor).of(current=live.current, throttle=live.throttle)
+    quantity = quantity_of(in_force.regressor)
+    return quantity.of(current=live.current, throttle=live.throttle) if quantity.is_told else None
 
 
 def _heading(field: FloatArray, live: LiveSnapshot) -> float | None:

@@ -81,6 +81,28 @@ def test_a_compass_that_drops_out_is_named(sound):
     assert "drops out" in complaint
 
 
+def test_dropouts_of_a_few_readings_show_on_a_slow_link_too(sound):
+    """At 1.7 readings a second four seconds are hardly more than six readings."""
+    field = sound.field[1]
+    slow = np.arange(len(field)) % 6 == 0
+    assert compass_complaints(with_field(sound, field.value, slow), 1) == ()
+    (complaint,) = compass_complaints(
+        with_field(sound, field.value, slow & (field.time % 15.0 > 4.0)), 1
+    )
+    assert "drops out" in complaint
+
+
+def test_strong_soft_iron_on_a_slow_link_is_no_glitch(sound):
+    """Each reading of a turn then differs much from the one before."""
+    field = sound.field[1]
+    slow = np.arange(len(field)) % 6 == 0
+    turned = np.cumsum(np.where(field.time % 15.0 < 5.0, 0.1, 0.0))
+    axes = np.stack([np.cos(turned), np.sin(turned), np.full(len(turned), 0.3)], axis=1)
+    noise = np.random.default_rng(3).normal(size=axes.shape)
+    stretched = 480.0 * axes * np.array([1.5, 0.7, 0.7]) + noise
+    assert compass_complaints(with_field(sound, stretched, slow), 1) == ()
+
+
 def test_a_gap_of_the_whole_link_is_not_the_compass(sound):
     field, attitude = sound.field[1], sound.attitude
     heard = attitude.time % 15.0 > 4.0

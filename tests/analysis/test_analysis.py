@@ -262,7 +262,7 @@ def test_each_method_asked_for_by_name_gives_what_auto_gives_where_auto_takes_it
 
 @pytest.mark.parametrize(
     "wrong",
-    [{"method": "guess"}, {"regressor": "volts"}, {"regressor": "motors"}, {"start": 5, "end": 5}],
+    [{"method": "guess"}, {"regressor": "volts"}, {"start": 5, "end": 5}],
 )
 def test_options_that_cannot_be_are_refused(wrong):
     with pytest.raises(UsageError, match="must be"):

@@ -17,6 +17,7 @@ from magcomp.autopilots.ardupilot_names import ACTING, acting_on
 from magcomp.errors import MissingDataError, ParameterFileError
 from magcomp.model import (
     CURRENT,
+    DRIVE,
     THROTTLE,
     Compass,
     Correction,
@@ -27,6 +28,7 @@ from magcomp.model import (
 )
 
 ARDUPILOT: Autopilot = autopilots.named("ardupilot")
+PX4: Autopilot = autopilots.named("px4")
 
 vectors = st.tuples(*[st.floats(-1000.0, 1000.0)] * 3).map(np.array)
 fields = st.lists(vectors, min_size=1, max_size=4).map(np.array)
@@ -250,11 +252,39 @@ def test_a_compass_whose_soft_iron_cannot_be_undone_is_left_out_and_no_other(val
     assert f"COMPASS_DIA2_Y {value:g}" in str(found[2])
 
 
-def test_a_compass_corrected_per_motor_is_left_out():
-    parameters = history(held(COMPASS_PMOT_EN=1.0))
-    found = ARDUPILOT.left_out(parameters)
-    assert set(found) == {1}
-    assert "COMPASS_PMOT_EN must be 0" in str(found[1])
+def test_a_compass_corrected_motor_by_motor_is_undone_by_its_own_law():
+    vectors = {f"COMPASS_PMOT{m}_{axis}": float(m) for m in (1, 2, 3, 4) for axis in "XYZ"}
+    on = {"COMPASS_PMOT_EN": 1.0, "COMPASS_PMOT_EXP": 1.5, **vectors}
+    parameters = history(held(**on))
+    assert ARDUPILOT.left_out(parameters) == {}
+    found = ARDUPILOT.in_force_at(parameters, 1, 0.0)
+    assert found.regressor == DRIVE
+    assert found.correction.motor.tolist() == [[1.0, 2.0, 3.0, 4.0]] * 3
+    drive = np.full((1, 4), 4.0)
+    assert found.correction.added(found.multiplied(drive)).tolist() == [[80.0, 80.0, 80.0]]
+    assert ARDUPILOT.in_force_at(parameters, 2, 0.0).regressor != DRIVE
+
+
+def test_a_law_motor_by_motor_needs_its_parameters_and_is_of_compass_1():
+    part = ARDUPILOT.in_force_at(history(held(COMPASS_PMOT_EN=1.0, COMPASS_PMOT_EXP=1.0)), 1, 0.0)
+    assert "COMPASS_PMOT4_Z" in part.unseen
+    assert ARDUPILOT.motor_law(1, held(COMPASS_PMOT_EN=0.0)).numbers == (1, 2, 3, 4)
+    assert ARDUPILOT.motor_law(2, held(COMPASS_PMOT_EN=0.0)) is None
+    assert ARDUPILOT.motor_law(1, {}) is None
+    assert PX4.motor_law(1, {}) is None
+
+
+def test_a_correction_by_one_quantity_switches_the_one_motor_by_motor_off():
+    on = held(COMPASS_PMOT_EN=1.0)
+    assert ARDUPILOT.switch_parameters("current", [1], on)["COMPASS_PMOT_EN"] == 0.0
+    assert "COMPASS_PMOT_EN" not in ARDUPILOT.switch_parameters("current", [2], on)
+
+
+def test_motors_are_counted_by_their_functions_whatever_outputs_they_are_on():
+    functions = {"SERVO1_FUNCTION": 34.0, "SERVO2_FUNCTION": 0.0, "SERVO3_FUNCTION": 33.0}
+    found = ARDUPILOT.motor_outputs(history({**functions, "SERVO9_FUNCTION": 82.0}), 16)
+    assert found.channels == (2, 0, 8)
+    assert found.numbers == (1, 2, 9)
 
 
 # --- settings --------------------------------------------------------------------------------

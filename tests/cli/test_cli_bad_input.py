@@ -197,7 +197,6 @@ def test_a_log_without_parameters_is_no_ground_to_write_anything(
         (("fit", "x.tlog", "--start", "soon"), "soon"),
         (("fit", "x.tlog", "--start", "5", "--end", "5"), "5.0"),
         (("fit", "x.tlog", "--start", "nan"), "nan"),
-        (("fit", "x.tlog", "--regressor", "motors"), "motors"),
     ],
 )
 def test_a_command_that_cannot_be_gets_one_sentence(

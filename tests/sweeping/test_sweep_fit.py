@@ -15,10 +15,10 @@ from magcomp.sources import read
 UNIX_S = 1.75e9
 
 
-@pytest.fixture(scope="module")
-def swept():
+@pytest.fixture(scope="module", params=["ardupilot", "px4"])
+def swept(request):
     """A whole sweep, as it comes over a link."""
-    bench = Bench(rates=RATES)
+    bench = Bench(rates=RATES[request.param], autopilot=request.param)
     bench.vehicle.receive(Asker().parameter_list(), bench.now)
     return bench, bench.sweep()
 

@@ -30,6 +30,14 @@ def test_each_motor_spins_for_its_time_and_all_together():
     assert outcome.done[4].current > 2.5 * outcome.done[0].current
 
 
+def test_a_smoothed_current_of_the_step_before_does_not_count_as_rest():
+    swept = bench()
+    outcome = swept.sweep(lambda b: Reason.KEY if b.now > 31.0 else None)
+    gentle, strong = outcome.done[0], outcome.done[5]
+    assert (gentle.step.motors, strong.step.motors) == ((1,), (1,))
+    assert strong.current > 1.5 * gentle.current
+
+
 def test_a_key_stops_at_once():
     swept, press = bench(), Once(lambda _: Reason.KEY)
     assert swept.sweep(press).reason is Reason.KEY

@@ -1,0 +1,147 @@
+"""A correction motor by motor, as this vehicle's firmware can apply it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from magcomp import autopilots
+from magcomp.align import drive_of_motors, interpolate
+from magcomp.analysis.compare import Judged
+from magcomp.autopilots.terms import MotorLaw
+from magcomp.fit.nearest import moved, nearest
+from magcomp.judge.evidence import used_lags
+from magcomp.judge.finding import severity
+from magcomp.judge.forms import left_deg
+from magcomp.judge.thresholds import Thresholds
+from magcomp.model import (
+    MOTORS,
+    AsWritten,
+    Control,
+    FloatArray,
+    Grade,
+    HeadingError,
+    MotorFit,
+    Recording,
+    Samples,
+    Series,
+    quantity_of,
+)
+
+_LEAST_EXPONENT, _STEPS = 0.3, 35
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What of a fit can be written.
+
+    Attributes
+    ----------
+    judged
+        The fit and its verdict.
+    written
+        The fit by one quantity; of a fit motor by motor the nearest to it over the range flown.
+    parameters
+        Of the correction motor by motor; empty where one quantity is written.
+    told
+        Which of the two is written, and what it leaves; None where that is the fit itself.
+    """
+
+    judged: Judged
+    written: MotorFit
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    told: AsWritten | None = None
+
+
+def as_written(recording: Recording, judged: Judged) -> Answer:
+    """Bring a fit into the form that the firmware multiplies.
+
+    Parameters
+    ----------
+    recording, judged
+        What was fitted, and what came out.
+    """
+    problem, fit = judged.problem, judged.fit
+    if problem.control.parts == 1:
+        return Answer(judged, fit)
+    samples = problem.sample(used_lags(fit))
+    whole = fit.correction.apply(samples.raw, samples.u)
+    added = fit.correction.added(samples.u)
+    found, left = nearest(added, samples.total[:, None])
+    single = replace(
+        fit,
+        regressor=quantity_of(fit.regressor).single,
+        correction=moved(fit.correction, found),
+        covariance=fit.shared_covariance,
+        numbers=(),
+    )
+    told = AsWritten(single.regressor, np.nan, left_deg(left, whole, samples))
+    autopilot, values = autopilots.of(recording), recording.parameters.latest
+    law = autopilot.motor_law(fit.compass, values)
+    drive = None if law is None else _drive(recording, problem.control, samples, law)
+    if law is None or drive is None:
+        return _answer(recording, judged, single, {}, told)
+    exponents = np.linspace(_LEAST_EXPONENT, law.most_exponent, _STEPS)
+    exponent = min(
+        exponents.tolist(), key=lambda e: float(np.sum(nearest(added, drive**e)[1] ** 2))
+    )
+    found, left = nearest(added, drive**exponent)
+    parameters = autopilot.per_motor_parameters(
+        moved(fit.correction, found),
+        exponent,
+        fit.compass,
+        values,
+        soft_iron_fitted="diagonal" in fit.free,
+    )
+    told = AsWritten(MOTORS, exponent, left_deg(left, whole, samples))
+    return _answer(recording, judged, single, parameters, told)
+
+
+def _answer(
+    recording: Recording,
+    judged: Judged,
+    written: MotorFit,
+    parameters: Mapping[str, float],
+    told: AsWritten,
+) -> Answer:
+    """With a word on what the firmware's form leaves, and no better a grade than that allows."""
+    title, limits = autopilots.of(recording).title, Thresholds()
+    how = (
+        f"{title} corrects it motor by motor, with an exponent of {told.exponent:.2f}"
+        if parameters
+        else f"{title} multiplies one {told.regressor} for all motors of this compass"
+    )
+    grade = (
+        Grade.GOOD
+        if told.left_deg <= limits.good_deg
+        else Grade.MARGINAL
+        if told.left_deg <= limits.marginal_deg
+        else Grade.REJECTED
+    )
+    reason = f"{how}: as this flight was flown, that leaves up to {told.left_deg:.1f}°"
+    verdict = judged.verdict
+    worse = max(grade, verdict.grade, key=severity)
+    reasons = (*verdict.reasons, reason) if grade is Grade.GOOD else (reason, *verdict.reasons)
+    errors = tuple(_with(row, told.left_deg) for row in verdict.heading_error)
+    verdict = replace(verdict, grade=worse, reasons=reasons, heading_error=errors)
+    again = replace(judged, verdict=verdict)
+    return Answer(again, written, parameters, told)
+
+
+def _with(row: HeadingError, left: float) -> HeadingError:
+    """A row with what the firmware's form leaves, which is independent of the rest."""
+    return replace(row, after=float(np.hypot(row.after, left)), p95=float(np.hypot(row.p95, left)))
+
+
+def _drive(
+    recording: Recording, control: Control, samples: Samples, law: MotorLaw
+) -> FloatArray | None:
+    """What drives the law's motors at each reading, shape (n, k); None where others turn too."""
+    drive = drive_of_motors(recording)
+    if drive is None or drive.numbers != law.numbers or control.numbers != law.numbers:
+        return None
+    # Row by row what the currents were made of, on their own clock.
+    series = Series(control.series.time, drive.series.value)
+    return np.maximum(interpolate(series, samples.time - samples.lags.regressor), 0.0)

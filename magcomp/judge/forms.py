@@ -1,0 +1,170 @@
+"""Which form the motors' field has: straight in one quantity, curved, or each motor its own.
+
+Each form is a few more columns beside the fitted ones of one current, solved on four fifths of
+the flight and looked at on the last. The simplest form that no other is clearly better than is
+the one to believe (docs/method.md, Motor by motor).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import reduce
+
+import numpy as np
+
+from magcomp.align import interpolate
+from magcomp.fit import Problem, folds, spread
+from magcomp.fit.field_model import (
+    correction_at,
+    parameters_of,
+    strength_and_dip,
+)
+from magcomp.fit.flight import prior
+from magcomp.fit.nearest import moved, nearest
+from magcomp.fit.robust import spread_of
+from magcomp.geometry import heading_shift
+from magcomp.judge.evidence import used_lags
+from magcomp.model import (
+    BoolArray,
+    Control,
+    Correction,
+    FloatArray,
+    Form,
+    MotorFit,
+    Samples,
+    Series,
+)
+
+CLEARLY = 0.97
+"""A form with more numbers must leave less than this share of what a simpler one leaves unseen."""
+
+MOST = 0.99
+"""Heading errors in flight are those that this share of the readings does not exceed."""
+
+CURVED = "curved current"
+_MOST_FREE, _LEAST_FOLDS = 4, 3
+
+
+@dataclass(frozen=True, eq=False)
+class _Tried:
+    name: str
+    count: int
+    held_out: float
+    added: FloatArray
+    u: FloatArray
+
+
+def forms(
+    problem: Problem,
+    fit: MotorFit,
+    motors: Control | None,
+    throttle: Control | None,
+) -> tuple[Form, ...]:
+    """Compare what the field may follow, the simplest first.
+
+    Parameters
+    ----------
+    problem, fit
+        A flight and its fit by one current.
+    motors
+        The current of each motor, where known.
+    throttle
+        The throttle, where known.
+    """
+    whole = problem.sample(used_lags(fit))
+    against = {fit.regressor: problem, CURVED: _curved(problem, whole)}
+    for control in (throttle, motors):
+        if control is not None:
+            against[control.kind] = replace(problem, control=control)
+    against = _of_the_same_readings(against)
+    samples = against[fit.regressor].sample(used_lags(fit))
+    if len(np.unique(folds(samples.time))) < _LEAST_FOLDS:
+        return ()
+    tried = [
+        _tried(name, of, fit, problem.control if of.control is throttle else None)
+        for name, of in against.items()
+    ]
+    tried.sort(key=lambda each: each.count)
+    best = tried[0]
+    for each in tried[1:]:
+        if each.held_out < CLEARLY * best.held_out:
+            best = each
+    richest = min(tried, key=lambda each: each.held_out)
+    field = fit.correction.apply(samples.raw, samples.u)
+    return tuple(
+        Form(
+            each.name,
+            each.count,
+            each.held_out,
+            np.nan
+            if best is tried[0] or each.name == richest.name
+            else left_deg(nearest(richest.added, each.u)[1], field, samples),
+            is_best=each is best,
+        )
+        for each in tried
+    )
+
+
+def _of_the_same_readings(against: Mapping[str, Problem]) -> dict[str, Problem]:
+    """Each with the readings that none of the others has in a gap of its quantity."""
+    common = reduce(np.intersect1d, (each.readings.time for each in against.values()))
+    return {name: each.where(np.isin(each.readings.time, common)) for name, each in against.items()}
+
+
+def left_deg(left: FloatArray, field: FloatArray, samples: Samples) -> float:
+    """Heading error that a field left over makes in a flight, degrees; see :data:`MOST`."""
+    roll, pitch = samples.attitude[:, 0], samples.attitude[:, 1]
+    return float(np.degrees(np.quantile(np.abs(heading_shift(left, field, roll, pitch)), MOST)))
+
+
+def _curved(problem: Problem, samples: Samples) -> Problem:
+    """The same against the current and its square: bent up, or down where it saturates."""
+    series = problem.control.total
+    top = max(float(np.quantile(samples.total, 0.98)), 1e-9)
+    parts = np.column_stack([series.value, series.value**2 / top])
+    return replace(problem, control=replace(problem.control, series=Series(series.time, parts)))
+
+
+def _tried(name: str, problem: Problem, fit: MotorFit, base: Control | None = None) -> _Tried:
+    """A form solved beside a fit of one quantity, on each part of the flight in turn.
+
+    Where it has none of that quantity, ``base``, it begins at what is nearest to the fit.
+    """
+    lags = used_lags(fit)
+    samples = problem.sample(lags)
+    begun = _begun(fit.correction, name, samples)
+    if base is not None:
+        then = samples.time - lags.regressor
+        added = fit.correction.added(interpolate(base.series, then))
+        begun = moved(fit.correction, nearest(added, samples.u)[0])
+    start = parameters_of(replace(fit, correction=begun), lags)
+    values, slopes = strength_and_dip(samples, start)
+    scale = spread_of(values)
+    root = 1.0 / scale / np.sqrt(np.sqrt(1.0 + (values / scale / 2.0) ** 2))
+    known = prior(problem, _MOST_FREE)
+    moving = known.width > 0.0
+    precision = np.diag(known.precision[moving])
+
+    def solved(rows: BoolArray) -> FloatArray:
+        flat = (slopes[rows][:, :, moving] * root[rows][:, :, None]).reshape(-1, moving.sum())
+        left = (values[rows] * root[rows]).reshape(-1)
+        step = np.zeros(len(start))
+        # A form that the readings do not determine is solved as far as they do.
+        step[moving] = -np.linalg.pinv(flat.T @ flat + precision, hermitian=True) @ flat.T @ left
+        return step
+
+    fold = folds(samples.time)
+    parts = [fold == index for index in np.unique(fold) if np.any(fold != index)]
+    unseen = np.concatenate([values[here] + slopes[here] @ solved(~here) for here in parts])
+    found = correction_at(start + solved(np.ones(len(samples), dtype=bool)))
+    return _Tried(name, found.motor.size, spread(unseen), found.added(samples.u), samples.u)
+
+
+def _begun(correction: Correction, name: str, samples: Samples) -> Correction:
+    """A correction of as many parts as the samples have, which corrects as the given one does."""
+    parts = samples.u.shape[1]
+    vectors = np.tile(correction.vector[:, None], parts)
+    if name == CURVED:
+        vectors[:, 1:] = 0.0
+    return replace(correction, motor=vectors)

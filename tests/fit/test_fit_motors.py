@@ -1,0 +1,126 @@
+"""A vector for each motor: found where the flight tells the motors apart, else taken as alike."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from synthetic import INTERFERENCE, earth
+from unequal import VECTORS, Unequal
+
+from magcomp.align import controls, currents_of_motors, readings, to_undo
+from magcomp.fit import Problem, best_form, fit
+from magcomp.fit.motors import contrasts
+from magcomp.judge import judge
+from magcomp.judge.forms import forms, left_deg
+from magcomp.model import CURRENT, Lags
+
+ALIKE = Unequal(seed=2, vectors=np.tile(INTERFERENCE, (4, 1)))
+
+
+def problem_of(flown, motors):
+    recording = flown.recording()
+    found = controls(recording)
+    forms = currents_of_motors(recording) if motors else [c for c in found if c.kind == CURRENT]
+    new, in_force = readings(recording, 1), to_undo(recording, found)
+    return best_form([Problem(new, form, in_force, earth()) for form in forms])
+
+
+@cache
+def fitted(flown_seed, apart=0.35):
+    problem = problem_of(Unequal(seed=flown_seed, apart=apart), motors=True)
+    return problem, fit(problem)
+
+
+def left_in_flight(flown, problem, found):
+    """Heading error against the truth, degrees, in all but a hundredth of the flight."""
+    samples = problem.sample(Lags(flown.field_lag, found.lags.regressor))
+    exact = flown.added_at(samples.time - flown.current_lag)
+    corrected = found.correction.apply(samples.raw, samples.u)
+    clean = (samples.raw + flown.exact.offset) @ flown.exact.soft_iron.T - exact
+    return left_deg(corrected - clean, clean, samples)
+
+
+def test_the_currents_of_the_motors_add_up_to_the_battery_and_follow_each_motor():
+    flown = Unequal(seed=1)
+    control = currents_of_motors(flown.recording())[2]
+    middle = control.series.time[50:-50]
+    true = flown.drawn_at(middle)
+    found = control.series.value[50:-50]
+    assert control.numbers == (1, 2, 3, 4)
+    assert np.abs(found - true).max() < 0.06 * true.max()
+    assert np.abs(control.total.value[50:-50] - flown.current_at(middle)).max() < 0.5
+
+
+def test_each_motors_vector_is_found_within_a_twentieth():
+    _, found = fitted(1)
+    apart = np.linalg.norm(-found.correction.motor.T - VECTORS, axis=1)
+    assert np.all(apart < 0.05 * np.linalg.norm(VECTORS, axis=1))
+
+
+def test_motor_by_motor_leaves_half_a_degree_where_one_current_leaves_three():
+    flown = Unequal(seed=1)
+    problem, found = fitted(1)
+    single = problem_of(flown, motors=False)
+    assert left_in_flight(flown, single, fit(single)) > 3.0
+    assert left_in_flight(flown, problem, found) < 0.5
+
+
+@pytest.mark.parametrize("seed", [2, 3])
+def test_motors_that_are_alike_are_fitted_no_worse_than_by_one_current(seed):
+    flown = replace(ALIKE, seed=seed)
+    problem, single = (problem_of(flown, motors) for motors in (True, False))
+    by_motor, by_current = fit(problem), fit(single)
+    assert left_in_flight(flown, problem, by_motor) < 0.2
+    assert left_in_flight(flown, problem, by_motor) < 0.1 + left_in_flight(
+        flown, single, by_current
+    )
+    spread = np.ptp(by_motor.correction.motor, axis=1)
+    assert spread.max() < 0.05 * np.linalg.norm(INTERFERENCE)
+
+
+def test_a_vector_lies_within_what_its_covariance_allows():
+    _, found = fitted(1)
+    std = np.sqrt(np.diag(found.covariance))
+    error = -found.correction.motor.T.reshape(-1) - VECTORS.reshape(-1)
+    assert np.abs(error / np.concatenate([std[:3], std[12:]])).max() < 6.0
+
+
+def test_a_flight_that_does_not_tell_the_motors_apart_says_what_to_fly():
+    problem, found = fitted(1, 0.002)
+    _, verdict = judge(problem, found)
+    assert any("can hardly be told apart" in reason for reason in verdict.reasons)
+    assert any("brisk" in reason for reason in verdict.reasons)
+    _, told = judge(*fitted(1))
+    assert not any("told apart" in reason for reason in told.reasons)
+
+
+def test_what_differs_in_a_turn_asks_for_turns():
+    problem, found = fitted(1)
+    yaw = contrasts(4) @ np.array([1.0, 1.0, -1.0, -1.0]) / 2.0
+    doubt = np.kron(np.outer(yaw, yaw), 25.0 * np.eye(3)) + 1e-6 * np.eye(9)
+    _, verdict = judge(problem, replace(found, told_apart=doubt))
+    assert any("fly turns that start and stop briskly" in reason for reason in verdict.reasons)
+
+
+def best_of(flown):
+    problem = problem_of(flown, motors=False)
+    motors = currents_of_motors(flown.recording())[0]
+    tried = forms(problem, fit(problem), motors, None)
+    return {form.name: form for form in tried}, next(f.name for f in tried if f.is_best)
+
+
+def test_the_simplest_form_that_explains_the_flight_is_the_best():
+    assert best_of(ALIKE)[1] == CURRENT
+    tried, best = best_of(Unequal(seed=1))
+    assert best == "motors"
+    assert tried[CURRENT].left_deg > 3.0
+    assert tried["motors"].held_out < 0.5 * tried[CURRENT].held_out
+
+
+def test_a_field_that_bends_with_the_current_is_seen_and_weighed():
+    tried, best = best_of(replace(ALIKE, bend=3.0, swing=12.0))
+    assert best == "curved current"
+    assert 0.5 < tried[CURRENT].left_deg < 10.0
