@@ -9,10 +9,13 @@ from magcomp.model import FloatArray, Recording, Series
 
 _FROZEN_S = 5.0
 _SILENT_S = 1.5
-_SILENT_SHARE = 0.08
+_SILENT_SHARE, _SILENT_STEPS = 0.08, 4.0
+"""Links that lose a third of their messages at random are silent for so many steps a thirtieth of
+the time."""
+
 _WILD_SHARE = 0.02
 _WILD_MGAUSS = 120.0
-_WINDOW = 7
+_JUMPS = 3.0
 _LEAST_READINGS = 30
 _STUCK_SHARE = 0.25
 
@@ -118,15 +121,15 @@ def _silent(reported: Series, recording: Recording) -> str:
     if recording.attitude is None or len(recording.attitude) < 2:
         return ""
     step = np.diff(reported.time)
-    limit = max(_SILENT_S, 8 * float(np.median(step)))
+    limit = max(_SILENT_S, _SILENT_STEPS * float(np.median(step)))
     heard = recording.attitude.time
     usual_step = float(np.median(np.diff(heard)))
     lost = 0.0
     for index in np.flatnonzero(step > limit).tolist():
         first, last = float(reported.time[index]), float(reported.time[index + 1])
         inside = np.count_nonzero((heard > first) & (heard < last))
-        usual = (last - first) / usual_step
-        lost += last - first if inside > 0.6 * usual else 0.0
+        # Not divided by the step: it is 0 where most attitudes tell the time of another.
+        lost += last - first if inside * usual_step > 0.6 * (last - first) else 0.0
     if lost < _SILENT_SHARE * float(np.ptp(reported.time)):
         return ""
     return (
@@ -136,16 +139,16 @@ def _silent(reported: Series, recording: Recording) -> str:
 
 
 def _wild(reported: Series) -> str:
-    """Readings whose strength is far from their neighbours': turning does not change it."""
+    """Readings far from both neighbours, which are near each other: turning makes no such jumps."""
     new = np.r_[True, np.any(np.diff(reported.value, axis=0) != 0.0, axis=1)]
     value = reported.value[new]
     if len(value) < _LEAST_READINGS:
         return ""
     strength = np.linalg.norm(value, axis=1)
-    windows = np.lib.stride_tricks.sliding_window_view(strength, _WINDOW)
-    apart = np.abs(strength[_WINDOW // 2 : -(_WINDOW // 2)] - np.median(windows, axis=1))
-    usual = float(np.median(apart))
-    share = float(np.mean(apart > max(_WILD_MGAUSS, 10 * usual)))
+    before, here, after = strength[:-2], strength[1:-1], strength[2:]
+    apart = np.abs(here - (before + after) / 2.0)
+    limit = np.maximum(_JUMPS * np.abs(after - before), max(_WILD_MGAUSS, 10 * np.median(apart)))
+    share = float(np.mean(apart > limit))
     if share < _WILD_SHARE:
         return ""
     return f"glitches: {share * 100:.0f} % of its readings jump away from their neighbours"

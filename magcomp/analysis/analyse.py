@@ -18,6 +18,7 @@ from magcomp.align import (
     to_undo,
 )
 from magcomp.align.health import compass_complaints, current_complaints, vehicle_complaints
+from magcomp.align.orientation import orientation_complaint
 from magcomp.analysis.choose import with_speed_controllers
 from magcomp.analysis.compare import Judged, beaten, better
 from magcomp.analysis.emit import Emission, emit
@@ -262,6 +263,9 @@ def _one(
         problem = best_form([Problem(new, form, in_force, earth) for form in forms])
     complaints = _complaints(recording, compass, problem.control.kind)
     with solvable(compass):
+        samples = problem.sample(problem.usual_lags())
+        if turned := orientation_complaint(recording, samples, earth):
+            complaints = (turned, *complaints)
         found, verdict = judge(problem, fit(problem, wanted.method), complaints=complaints)
     require_finite(compass, (found.covariance, pack(found.correction), *_bounds(verdict)))
     return Judged(problem, found, _in_words_of(recording, verdict))

@@ -213,6 +213,10 @@ class ArduPilot:
         """By COMPASS_DEV_ID, and what COMPASS_EXTERNAL, ORIENT and USE say of each."""
         return ardupilot_settings.compasses(values)
 
+    def orientation_name(self, compass: int) -> str:
+        """COMPASS_ORIENT of the compass."""
+        return single_name("ORIENT", compass)
+
     def changes(
         self,
         parameters: ParameterHistory,

@@ -191,6 +191,10 @@ class Autopilot(Protocol):
         """The compasses that the parameters tell of, in the order of their slots."""
         ...
 
+    def orientation_name(self, compass: int) -> str:
+        """The parameter that says how a compass is mounted."""
+        ...
+
     def changes(
         self,
         parameters: ParameterHistory,

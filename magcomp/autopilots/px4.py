@@ -185,6 +185,10 @@ class Px4:
         """By CAL_MAGn_ID."""
         return px4_settings.compasses(values)
 
+    def orientation_name(self, compass: int) -> str:
+        """CAL_MAGn_ROT of the compass."""
+        return single_name("ROT", compass)
+
     def changes(
         self,
         parameters: ParameterHistory,

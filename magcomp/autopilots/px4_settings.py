@@ -21,8 +21,9 @@ from magcomp.autopilots.px4_names import (
     parse,
     single_name,
 )
-from magcomp.autopilots.px4_rotation import ROTATIONS, rotation_number
+from magcomp.autopilots.px4_rotation import rotation_number
 from magcomp.autopilots.px4_taking_over import sentences
+from magcomp.autopilots.rotations import ROTATIONS
 from magcomp.autopilots.terms import Kind
 from magcomp.errors import InputError, MissingDataError, ParameterFileError
 from magcomp.model import Compass, ParameterHistory

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from magcomp.errors import FitRejectedError, MissingDataError, UsageError
+from magcomp.fit.combine import still_rows, with_sweep
 from magcomp.fit.field_model import (
     FIELD_LAG,
     REGRESSOR_LAG,
@@ -192,13 +193,20 @@ def _with_lags(problem: Problem, fit: MotorFit) -> MotorFit:
 
 
 def fit_flight(problem: Problem) -> MotorFit:
-    """Fit a flight, opening as many groups of parameters as the data deserve."""
-    found, free = with_wander(problem, *_choose_freedom(problem))
+    """Fit a flight, opening as many groups of parameters as the data deserve.
+
+    A sweep on the ground in the same recording is fitted by itself, and the two are put together.
+    """
+    still = still_rows(problem.sample(Lags())) if problem.control.parts == 1 else None
+    flown = problem if still is None else problem.where(~still)
+    found, free = with_wander(flown, *_choose_freedom(flown))
     tell = differences_of(len(found.parameters))
     told_apart = tell @ found.covariance @ tell.T
     if len(told_apart):
         found = alike_where_unseen(found, blur(problem.control.series.value))
     bare = replace(_of_flight(problem, found, free), told_apart=told_apart)
+    if still is not None:
+        bare = with_sweep(bare, fit_sweep(problem.where(still)))
     samples = problem.sample(bare.lags)
     centres = centres_of_flight(
         samples, bare.correction, (bare.strength, bare.vertical), bare.noise

@@ -64,11 +64,43 @@ def test_a_frozen_compass_is_named_with_its_time(sound):
     assert "frozen from 6" in complaint
 
 
+def test_attitudes_that_tell_each_others_time_are_no_reason_to_fail(sound):
+    # As a fuzzed log had it: every attitude twice at one time, and a pause of the compass.
+    attitude = sound.attitude
+    twice = Series(np.repeat(attitude.time, 3), np.repeat(attitude.value, 3, axis=0))
+    field = sound.field[1]
+    keep = (field.time < 20.0) | (field.time > 40.0)
+    paused = replace(with_field(sound, field.value, keep), attitude=twice)
+    assert all("drops out" not in each for each in compass_complaints(paused, 1))
+
+
 def test_a_compass_that_drops_out_is_named(sound):
     field = sound.field[1]
     keep = field.time % 15.0 > 4.0
     (complaint,) = compass_complaints(with_field(sound, field.value, keep), 1)
     assert "drops out" in complaint
+
+
+def test_dropouts_of_a_few_readings_show_on_a_slow_link_too(sound):
+    """At 1.7 readings a second four seconds are hardly more than six readings."""
+    field = sound.field[1]
+    slow = np.arange(len(field)) % 6 == 0
+    assert compass_complaints(with_field(sound, field.value, slow), 1) == ()
+    (complaint,) = compass_complaints(
+        with_field(sound, field.value, slow & (field.time % 15.0 > 4.0)), 1
+    )
+    assert "drops out" in complaint
+
+
+def test_strong_soft_iron_on_a_slow_link_is_no_glitch(sound):
+    """Each reading of a turn then differs much from the one before."""
+    field = sound.field[1]
+    slow = np.arange(len(field)) % 6 == 0
+    turned = np.cumsum(np.where(field.time % 15.0 < 5.0, 0.1, 0.0))
+    axes = np.stack([np.cos(turned), np.sin(turned), np.full(len(turned), 0.3)], axis=1)
+    noise = np.random.default_rng(3).normal(size=axes.shape)
+    stretched = 480.0 * axes * np.array([1.5, 0.7, 0.7]) + noise
+    assert compass_complaints(with_field(sound, stretched, slow), 1) == ()
 
 
 def test_a_gap_of_the_whole_link_is_not_the_compass(sound):

@@ -26,8 +26,9 @@ from magcomp.autopilots.px4_correction import (
     uncorrect,
 )
 from magcomp.autopilots.px4_names import vector_names
-from magcomp.autopilots.px4_rotation import ROTATIONS, sensor_to_body
+from magcomp.autopilots.px4_rotation import sensor_to_body
 from magcomp.autopilots.px4_taking_over import unsettled
+from magcomp.autopilots.rotations import ROTATIONS
 from magcomp.errors import MissingDataError, ParameterFileError
 from magcomp.model import (
     CURRENT,
