@@ -128,8 +128,8 @@ def _silent(reported: Series, recording: Recording) -> str:
     for index in np.flatnonzero(step > limit).tolist():
         first, last = float(reported.time[index]), float(reported.time[index + 1])
         inside = np.count_nonzero((heard > first) & (heard < last))
-        usual = (last - first) / usual_step
-        lost += last - first if inside > 0.6 * usual else 0.0
+        # Not divided by the step: it is 0 where most attitudes tell the time of another.
+        lost += last - first if inside * usual_step > 0.6 * (last - first) else 0.0
     if lost < _SILENT_SHARE * float(np.ptp(reported.time)):
         return ""
     return (

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
+from magcomp.fleet.findings import Attention, Finding, date
 from magcomp.fleet.flights import Flight, Selected
-from magcomp.fleet.history import Attention, CompassHistory, Finding, date, history
+from magcomp.fleet.history import CompassHistory, Slot, histories
 from magcomp.judge.thresholds import Thresholds
 
 
@@ -86,10 +87,27 @@ def aircraft(selected: Selected, limits: Thresholds | None = None) -> tuple[Airc
         # What could not even be read belongs to nobody.
         if flight.autopilot and (flight.uid or flight.device_ids):
             groups.setdefault(owner(flight), ([], []))[1].append(flight)
+    standing = [_standing(flights) for flights, _ in groups.values()]
+    told = iter(histories([slot for slots in standing for slot in slots], limits))
     found = [
-        _aircraft(who, flights, unusable, limits) for who, (flights, unusable) in groups.items()
+        _aircraft(who, *of, [next(told) for _ in slots], limits)
+        for (who, of), slots in zip(groups.items(), standing, strict=True)
     ]
     return tuple(sorted(found, key=_urgency))
+
+
+def _standing(flights: Sequence[Flight]) -> list[Slot]:
+    """The compasses that stand in an aircraft now, and the flights of each.
+
+    Another compass in the same place is compared with nothing that was there before.
+    """
+    slots: dict[int, list[Flight]] = {}
+    for flight in flights:
+        slots.setdefault(flight.compass, []).append(flight)
+    return [
+        (slot, mine[-1].device_id, [f for f in mine if f.device_id == mine[-1].device_id])
+        for slot, mine in sorted(slots.items())
+    ]
 
 
 def _urgency(each: Aircraft) -> tuple[int, float, str]:
@@ -119,28 +137,26 @@ def _owner(flight: Flight, boards: dict[tuple[str, str], set[str]]) -> tuple[str
 
 
 def _aircraft(
-    who: tuple[str, ...], flights: list[Flight], unusable: list[Flight], limits: Thresholds
+    who: tuple[str, ...],
+    flights: list[Flight],
+    unusable: list[Flight],
+    histories: list[CompassHistory],
+    limits: Thresholds,
 ) -> Aircraft:
     # Flights come in order of time, but for those of which none is known.
     in_order = flights[-1:] if flights and math.isfinite(flights[-1].when) else flights
     newest = max([*in_order, *unusable], key=_when)
-    slots = sorted({flight.compass for flight in flights})
-    histories = []
     changed: list[Finding] = []
-    for slot in slots:
-        mine = [flight for flight in flights if flight.compass == slot]
-        standing = mine[-1].device_id
-        # Another compass in the same place is compared with nothing that was there before.
-        same = [flight for flight in mine if flight.device_id == standing]
-        if len(same) < len(mine):
+    for one in histories:
+        before = sum(flight.compass == one.compass for flight in flights) - len(one.flights)
+        if before:
             changed.append(
                 Finding(
                     Attention.LOOK,
-                    f"compass {slot} was another one before {date(same[0].when)}: its "
-                    f"{_flights(len(mine) - len(same))} before are not compared",
+                    f"compass {one.compass} was another one before {date(one.flights[0].when)}: "
+                    f"its {_flights(before)} before are not compared",
                 )
             )
-        histories.append(history(slot, standing, same, limits))
     if who[0] == "compasses" and any(
         one.apart or one.scatter_deg > limits.departure_deg for one in histories
     ):

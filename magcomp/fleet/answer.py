@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from magcomp.fleet.aircraft import Aircraft
+from magcomp.fleet.findings import Attention
 from magcomp.fleet.flights import Flight, Selected
-from magcomp.fleet.history import Attention
 
 
 @dataclass(frozen=True, eq=False)

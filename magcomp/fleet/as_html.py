@@ -12,8 +12,9 @@ from magcomp import __version__
 from magcomp.fleet.aircraft import Aircraft
 from magcomp.fleet.answer import Fleet
 from magcomp.fleet.as_text import counted, largest_motor, summary
+from magcomp.fleet.findings import Attention, date, quantity
 from magcomp.fleet.flights import Flight
-from magcomp.fleet.history import Attention, CompassHistory, date, quantity
+from magcomp.fleet.history import CompassHistory
 from magcomp.fleet.task import report_name
 from magcomp.judge.thresholds import Thresholds
 from magcomp.model import Grade

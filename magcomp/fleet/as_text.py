@@ -14,7 +14,7 @@ from rich.text import Text
 from magcomp import __version__
 from magcomp.fleet.aircraft import Aircraft
 from magcomp.fleet.answer import Fleet
-from magcomp.fleet.history import Attention, date
+from magcomp.fleet.findings import Attention, date
 from magcomp.report import words
 from magcomp.report.as_text import render
 from magcomp.report.look import Look

@@ -3,59 +3,47 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from enum import IntEnum
+from typing import TypeVar
 
 import numpy as np
 
+from magcomp.fleet.findings import (
+    Attention,
+    Finding,
+    Holds,
+    changed_since,
+    holds_in,
+    of_newest,
+    scattering,
+    why,
+)
 from magcomp.fleet.flights import Flight
-from magcomp.fleet.pooled import SURE, Pooled, chances_apart, change, distances, is_definite, pool
+from magcomp.fleet.pooled import (
+    SURE,
+    Change,
+    Pooled,
+    chances_apart,
+    changes,
+    distances,
+    is_definite,
+    pool,
+    pools,
+)
 from magcomp.judge.thresholds import Thresholds
-from magcomp.model import Grade, unit_of
+from magcomp.model import Grade
 from magcomp.model.recording import FloatArray, IntArray
 
+_T = TypeVar("_T")
+
 _COVARIANCE = np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2]])
-_MOTOR, _SETTINGS = slice(0, 3), slice(3, 12)
-_ALIKE = 1e-3
+_MOTOR = slice(0, 3)
 _MOST_SUSPECTS = 6
 """Flights looked at closely: which of the many that are somewhat far off is the furthest, tells
 already their distance from the mean of all."""
 
 _TILT = math.sin(math.radians(20.0))
-
-
-class Attention(IntEnum):
-    """How soon somebody should look."""
-
-    NONE = 0
-    LOOK = 1
-    ACT = 2
-
-
-class Holds(IntEnum):
-    """Whether the calibration in force is still right, going by the newest flight."""
-
-    UNKNOWN = 0
-    YES = 1
-    BARELY = 2
-    NO = 3
-
-
-@dataclass(frozen=True)
-class Finding:
-    """What somebody should know of an aircraft.
-
-    Attributes
-    ----------
-    attention
-        How soon.
-    text
-        A clause, for people.
-    """
-
-    attention: Attention
-    text: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +89,32 @@ class CompassHistory:
     agree: bool = False
 
 
+Slot = tuple[int, int, Sequence[Flight]]
+"""A compass's slot, the id of what stands in it, and its flights in order of time, at least one."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Compared:
+    """A compass whose flights can be compared."""
+
+    slot: int
+    device_id: int
+    flights: Sequence[Flight]
+    usable: Sequence[int]
+    motors: FloatArray
+    covariances: FloatArray
+
+    @property
+    def at(self) -> float:
+        """Largest control quantity of its flights."""
+        return max(self.flights[i].u_high for i in self.usable)
+
+    @property
+    def shift(self) -> Callable[[FloatArray], FloatArray]:
+        """Heading shift there, degrees, of a difference of motor vectors."""
+        return _shift(self.flights[-1], self.at)
+
+
 def history(
     slot: int, device_id: int, flights: Sequence[Flight], limits: Thresholds
 ) -> CompassHistory:
@@ -115,56 +129,132 @@ def history(
     limits
         Of the judge.
     """
+    return histories([(slot, device_id, flights)], limits)[0]
+
+
+def histories(every: Sequence[Slot], limits: Thresholds) -> list[CompassHistory]:
+    """:func:`history` for many compasses: those with as many flights each are pooled at once."""
+    compared = [_compared(*each) for each in every]
+    known = [each for each in compared if each is not None]
+    pooled = _at_once(known, lambda some: pools(_motors_of(some), _covariances_of(some)))
+    apart = [
+        float(each.shift(each.motors - mean.motor).max()) > limits.departure_deg / 2
+        for each, mean in zip(known, pooled, strict=True)
+    ]
+    far = [each for each, is_far in zip(known, apart, strict=True) if is_far]
+    changed = iter(
+        _at_once(
+            far,
+            lambda some: changes(_times(some), _motors_of(some), _covariances_of(some)),
+        )
+    )
+    told = iter(
+        _told(each, mean, next(changed) if is_far else None, limits, is_far=is_far)
+        for each, mean, is_far in zip(known, pooled, apart, strict=True)
+    )
+    return [
+        _untold(*whole, limits) if each is None else next(told)
+        for whole, each in zip(every, compared, strict=True)
+    ]
+
+
+def _at_once(
+    every: Sequence[_Compared], work: Callable[[Sequence[_Compared]], Sequence[_T]]
+) -> list[_T]:
+    """What work says of each, asked once for all with as many flights."""
+    groups: dict[int, list[int]] = {}
+    for index, each in enumerate(every):
+        groups.setdefault(len(each.usable), []).append(index)
+    found: dict[int, _T] = {}
+    for indices in groups.values():
+        found |= zip(indices, work([every[index] for index in indices]), strict=True)
+    return [found[index] for index in range(len(every))]
+
+
+def _motors_of(some: Sequence[_Compared]) -> FloatArray:
+    return np.stack([each.motors for each in some])
+
+
+def _covariances_of(some: Sequence[_Compared]) -> FloatArray:
+    return np.stack([each.covariances for each in some])
+
+
+def _times(some: Sequence[_Compared]) -> FloatArray:
+    return np.array([[each.flights[i].when for i in each.usable] for each in some])
+
+
+def _compared(slot: int, device_id: int, flights: Sequence[Flight]) -> _Compared | None:
+    """The flights whose fit is believed, and made against what the newest was made against."""
+    regressor = flights[-1].regressor
+    asked = [
+        i
+        for i, each in enumerate(flights)
+        if each.verdict != Grade.REJECTED and each.regressor == regressor
+    ]
+    motors, covariances = _motors(flights, asked), _covariances(flights, asked)
+    sound = np.isfinite(motors).all(1) & is_definite(covariances)
+    if not sound.any():
+        return None
+    usable = [i for i, good in zip(asked, sound.tolist(), strict=True) if good]
+    return _Compared(slot, device_id, flights, usable, motors[sound], covariances[sound])
+
+
+def _untold(
+    slot: int, device_id: int, flights: Sequence[Flight], limits: Thresholds
+) -> CompassHistory:
+    """A compass of which no flight can be compared."""
     newest = flights[-1]
     holds = holds_in(newest, limits)
-    findings = list(_of_newest(slot, newest, holds, limits))
-    usable = _comparable(flights)
-    if not usable:
-        return CompassHistory(
-            slot, device_id, tuple(flights), newest.regressor, None, (), (), 0.0, holds,
-            tuple(findings),
-        )  # fmt: skip
-    motors, covariances = _motors(flights, usable), _covariances(flights, usable)
-    at = max(flights[i].u_high for i in usable)
-    shift = _shift(newest, at)
+    findings = tuple(of_newest(slot, newest, holds, limits))
+    regressor = newest.regressor
+    return CompassHistory(
+        slot, device_id, tuple(flights), regressor, None, (), (), 0.0, holds, findings
+    )
+
+
+def _told(
+    of: _Compared, pooled: Pooled, changed: Change | None, limits: Thresholds, *, is_far: bool
+) -> CompassHistory:
+    flights, usable, slot = of.flights, of.usable, of.slot
+    newest = flights[-1]
+    holds = holds_in(newest, limits)
+    findings = list(of_newest(slot, newest, holds, limits))
+    at, shift = of.at, of.shift
     agreeing: IntArray = np.arange(len(usable))
     drift = 0.0
     apart: list[tuple[int, float]] = []
-    pooled = pool(motors, covariances)
-    if float(shift(motors - pooled.motor).max()) > limits.departure_deg / 2:
-        times = np.array([flights[i].when for i in usable])
-        changed = change(times, motors, covariances)
+    if is_far:
         if changed is not None and float(shift(changed.difference)) > limits.departure_deg:
             drift = float(shift(changed.difference))
             agreeing = agreeing[changed.first :]
             when = flights[usable[changed.first]].when
-            findings.append(_changed(slot, changed.kind, when, drift, at, newest.regressor))
-        away = _Away(motors, covariances, shift, limits.departure_deg, pooled)
+            findings.append(changed_since(slot, changed.kind, when, drift, at, newest.regressor))
+        away = _Away(of.motors, of.covariances, shift, limits.departure_deg, pooled)
         agreeing, apart = _agree(agreeing, away)
         if len(agreeing) < len(usable):
-            pooled = pool(motors[agreeing], covariances[agreeing])
+            pooled = pool(of.motors[agreeing], of.covariances[agreeing])
     scatter_deg = float(shift(np.full(3, pooled.scatter)))
     agree = len(agreeing) > 1 and scatter_deg <= limits.departure_deg
     if scatter_deg > limits.departure_deg:
-        findings.append(_scattering(slot, len(agreeing), scatter_deg, at, newest.regressor))
+        findings.append(scattering(slot, len(agreeing), scatter_deg, at, newest.regressor))
     named = tuple(
         (usable[k], why(flights[usable[k]], [flights[usable[j]] for j in agreeing], float(deg)))
         for k, deg in apart
     )
     if named:
-        of = len(agreeing) + len(named)
+        count = len(agreeing) + len(named)
         listed = "; ".join(f"{flights[i].path} ({text})" for i, text in named[:3])
         more = f"; and {len(named) - 3} more" if len(named) > 3 else ""
         findings.append(
             Finding(
                 Attention.LOOK,
-                f"compass {slot}: {len(named)} of {of} flights disagree with the others: "
+                f"compass {slot}: {len(named)} of {count} flights disagree with the others: "
                 f"{listed}{more}",
             )
         )
     return CompassHistory(
         slot,
-        device_id,
+        of.device_id,
         tuple(flights),
         newest.regressor,
         pooled,
@@ -176,27 +266,6 @@ def history(
         scatter_deg,
         agree,
     )
-
-
-def _scattering(slot: int, count: int, degrees: float, at: float, regressor: str) -> Finding:
-    return Finding(
-        Attention.LOOK,
-        f"compass {slot}: what the motors add differs between {count} flights by about "
-        f"{degrees:.1f}° of heading at {quantity(at, regressor)}: they have no common answer",
-    )
-
-
-def _comparable(flights: Sequence[Flight]) -> list[int]:
-    """The flights whose fit is believed, and made against what the newest was made against."""
-    regressor = flights[-1].regressor
-    asked = [
-        i
-        for i, each in enumerate(flights)
-        if each.verdict != Grade.REJECTED and each.regressor == regressor
-    ]
-    covariances = _covariances(flights, asked)
-    sound = np.isfinite(_motors(flights, asked)).all(1) & is_definite(covariances)
-    return [i for i, good in zip(asked, sound.tolist(), strict=True) if good]
 
 
 def _motors(flights: Sequence[Flight], which: Sequence[int]) -> FloatArray:
@@ -225,14 +294,13 @@ class _Away:
         pooled = self.all_together if whole else pool(self.motors[among], covariances)
         # Of the others' mean a flight is as far as that, unless it drags the mean along.
         far = self.shift(self.motors[among] - pooled.motor) > self.departure_deg / 2
-        heaviest = int(np.argmin(np.trace(covariances, axis1=1, axis2=2)))
-        far[heaviest] |= far.any()
         suspects = np.flatnonzero(far)
-        if len(suspects) <= _MOST_SUSPECTS:
+        if not len(suspects):
             return suspects
-        unlikely = distances(self.motors[among][suspects], covariances[suspects], pooled)
-        unlikely[suspects == heaviest] = np.inf
-        return np.sort(suspects[np.argsort(unlikely)[-_MOST_SUSPECTS:]])
+        squared = distances(self.motors[among][suspects], covariances[suspects], pooled)
+        closest = suspects[np.argsort(squared)[-_MOST_SUSPECTS:]]
+        # The heaviest drags the mean along, and then stands near it itself.
+        return np.union1d(closest, np.argmin(np.trace(covariances, axis1=1, axis2=2)))
 
 
 def _agree(among: IntArray, away: _Away) -> tuple[IntArray, list[tuple[int, float]]]:
@@ -269,72 +337,3 @@ def _shift(flight: Flight, at: float) -> Callable[[FloatArray], FloatArray]:
         return np.where(sine < 1.0, np.degrees(np.arcsin(np.minimum(sine, 1.0))), 180.0)
 
     return degrees
-
-
-def holds_in(flight: Flight, limits: Thresholds) -> Holds:
-    """Whether the calibration that was in force on a flight was right."""
-    if flight.verdict == Grade.REJECTED or not math.isfinite(flight.before_deg):
-        return Holds.UNKNOWN
-    if flight.before_deg <= limits.good_deg:
-        return Holds.YES
-    return Holds.BARELY if flight.before_deg <= limits.marginal_deg else Holds.NO
-
-
-def _of_newest(slot: int, newest: Flight, holds: Holds, limits: Thresholds) -> Iterator[Finding]:
-    at = quantity(newest.u_high, newest.regressor)
-    if holds is Holds.NO or holds is Holds.BARELY:
-        yield Finding(
-            Attention.ACT if holds is Holds.NO else Attention.LOOK,
-            f"compass {slot}: the calibration in force does not hold: on {date(newest.when)} the "
-            f"heading was wrong by up to {newest.before_deg:.1f}° at {at} (limit "
-            f"{limits.good_deg:g}°)",
-        )
-    elif newest.verdict == Grade.REJECTED:
-        first = newest.reasons.partition("\n")[0]
-        yield Finding(
-            Attention.LOOK,
-            f"compass {slot}: its newest flight, {date(newest.when)}, gives no answer: {first}",
-        )
-
-
-def _changed(
-    slot: int, kind: str, when: float, degrees: float, at: float, regressor: str
-) -> Finding:
-    where = f"{degrees:.1f}° of heading at {quantity(at, regressor)}"
-    if kind == "step":
-        text = f"what the motors add changed on {date(when)} by {where}: was something moved?"
-    else:
-        text = f"what the motors add has drifted since {date(when)} by {where}"
-    return Finding(Attention.ACT, f"compass {slot}: {text}")
-
-
-def why(flight: Flight, others: Sequence[Flight], degrees: float) -> str:
-    """What is different about a flight that disagrees with others, as far as the rows tell."""
-    newest = others[-1]
-    found = [f"{degrees:.1f}° apart"]
-    if flight.verdict == Grade.MARGINAL:
-        found.append(f"marginal: {flight.reasons.partition(chr(10))[0]}")
-    if flight.firmware != newest.firmware:
-        found.append(f"firmware {flight.firmware or 'unknown'}")
-    settings = flight.in_force[_SETTINGS] - newest.in_force[_SETTINGS]
-    if bool((np.abs(settings) > _ALIKE).any()):
-        found.append("another compass calibration was in force")
-    if flight.u_high < min(each.u_high for each in others):
-        found.append(f"only up to {quantity(flight.u_high, flight.regressor)}")
-    if len(found) == 1:
-        found.append("nothing in the log tells why")
-    return ", ".join(found)
-
-
-def quantity(u: float, regressor: str) -> str:
-    """A control quantity for people."""
-    unit = unit_of(regressor)
-    return f"{u:.0f} {unit}" if unit else f"{100 * u:.0f} % throttle"
-
-
-def date(unix_s: float) -> str:
-    """A day, UTC; a question mark where it is unknown or none."""
-    if not math.isfinite(unix_s):
-        return "?"
-    days = np.datetime64(int(unix_s), "s") if abs(unix_s) < 1e11 else None
-    return "?" if days is None else str(days)[:10]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -74,20 +75,40 @@ def pool(motors: FloatArray, covariances: FloatArray) -> Pooled:
     τ²·(tr ΣW − tr((ΣW)⁻¹ ΣW²)), which gives τ², not below 0 (method of moments). The mean is then
     weighted by (C_i + τ²·I)⁻¹.
     """
+    return pools(motors[None], covariances[None])[0]
+
+
+def pools(motors: FloatArray, covariances: FloatArray) -> list[Pooled]:
+    """:func:`pool` for many compasses with as many flights each: all at once is far quicker.
+
+    Parameters
+    ----------
+    motors
+        Shape (n, k, 3).
+    covariances
+        Shape (n, k, 3, 3).
+    """
+    count = motors.shape[1]
     weights = _inverse(covariances)
     mean, inverse = _mean(motors, weights)
-    apart = motors - mean
-    q = float(np.einsum("ki,kij,kj->", apart, weights, apart))
-    spare = np.trace(weights.sum(0)) - np.trace(inverse @ (weights @ weights).sum(0))
-    between = max((q - 3 * (len(motors) - 1)) / spare, 0.0) if len(motors) > 1 else 0.0
-    if between > 0.0:
-        mean, inverse = _mean(motors, _inverse(covariances + between * np.eye(3)))
-    return Pooled(mean, inverse, float(np.sqrt(between)), len(motors))
+    apart = motors - mean[:, None]
+    q = np.einsum("nki,nki->n", apart, _times(weights, apart))
+    spare = np.einsum("nkii->n", weights) - np.einsum(
+        "nij,nkjl,nkli->n", inverse, weights, weights, optimize=True
+    )
+    between = np.zeros(len(motors))
+    if count > 1:
+        between = np.maximum((q - 3 * (count - 1)) / spare, 0.0)
+        scattered = np.flatnonzero(between > 0.0)
+        wide = covariances[scattered] + between[scattered, None, None, None] * np.eye(3)
+        mean[scattered], inverse[scattered] = _mean(motors[scattered], _inverse(wide))
+    scatter = np.sqrt(between).tolist()
+    return [Pooled(*each, count) for each in zip(mean, inverse, scatter, strict=True)]
 
 
 def _mean(motors: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
-    inverse = _inverse(weights.sum(0))
-    return inverse @ np.einsum("kij,kj->i", weights, motors), inverse
+    inverse = _inverse(weights.sum(1))
+    return _times(inverse, _times(weights, motors).sum(1)), inverse
 
 
 def distances(motors: FloatArray, covariances: FloatArray, pooled: Pooled) -> FloatArray:
@@ -181,45 +202,65 @@ def change(times: FloatArray, motors: FloatArray, covariances: FloatArray) -> Ch
     flight is no change: an F test, corrected for the number of places a step may stand at. A step
     leaves at least two flights on either side.
     """
-    count = len(motors)
+    return changes(times[None], motors[None], covariances[None])[0]
+
+
+def changes(times: FloatArray, motors: FloatArray, covariances: FloatArray) -> list[Change | None]:
+    """:func:`change` for many compasses with as many flights each: all at once is far quicker.
+
+    Parameters
+    ----------
+    times
+        Shape (n, k).
+    motors, covariances
+        As in :func:`pools`.
+    """
+    number, count = times.shape
     if count < 3:
-        return None
+        return [None] * number
     # With the scatter from flight to flight in the weights, so that no flight counts for all.
-    weights = _inverse(covariances + _scatter(motors, covariances) * np.eye(3))
+    scatter = _scatter(motors, covariances)
+    weights = _inverse(covariances + scatter[:, None, None, None] * np.eye(3))
     sums = _Sums(weights, motors)
-    whole = float(_Sums(*sums.whole).left())
-    found: list[tuple[float, Change]] = []
-    span = times - times[0]
-    if np.isfinite(span).all() and len(np.unique(span)) >= 3:
-        left, slope = _line(span / span[-1], motors, weights)
-        found.append((left, Change("drift", 0, slope, float(_chance(whole, left, count)))))
+    whole = _Sums(*sums.whole).left()
+    found: list[list[tuple[float, Change]]] = [[] for _ in range(number)]
+    for n, left, slope in _lines(times, motors, weights):
+        chance = float(_chance(whole[n], left, count))
+        found[n].append((left, Change("drift", 0, slope, chance)))
     if count >= 4:
-        found.append(_best_step(sums, whole, count))
-    sure = [(left, each) for left, each in found if each.chance < SURE]
-    return min(sure, key=lambda pair: pair[0])[1] if sure else None
+        for n, step in enumerate(_best_steps(sums, whole, count)):
+            found[n].append(step)
+    sure = [[(left, each) for left, each in of if each.chance < SURE] for of in found]
+    return [min(of, key=lambda pair: pair[0])[1] if of else None for of in sure]
 
 
-def _best_step(sums: _Sums, whole: float, count: int) -> tuple[float, Change]:
-    before = _Sums(*(np.cumsum(each, axis=0)[1 : count - 2] for each in sums.terms))
-    after = _Sums(*(a - b for a, b in zip(sums.whole, before.terms, strict=True)))
+def _best_steps(sums: _Sums, whole: FloatArray, count: int) -> Iterator[tuple[float, Change]]:
+    before = _Sums(*(np.cumsum(each, axis=1)[:, 1 : count - 2] for each in sums.terms))
+    pairs = zip(sums.whole, before.terms, strict=True)
+    after = _Sums(*(a[:, None] - b for a, b in pairs))
     left = before.left() + after.left()
-    best = int(np.argmin(left))
-    chance = float(_chance(whole, float(left[best]), count)) * len(left)
-    difference = after.mean(best) - before.mean(best)
-    return float(left[best]), Change("step", best + 2, difference, min(chance, 1.0))
+    best = np.argmin(left, axis=1)
+    rows = np.arange(len(best))
+    differences = after.mean(rows, best) - before.mean(rows, best)
+    least = left[rows, best]
+    chances = np.minimum(_chance(whole, least, count) * left.shape[1], 1.0)
+    for n, (place, chance) in enumerate(zip(best.tolist(), chances.tolist(), strict=True)):
+        yield float(least[n]), Change("step", place + 2, differences[n], chance)
 
 
-def _scatter(motors: FloatArray, covariances: FloatArray) -> float:
+def _scatter(motors: FloatArray, covariances: FloatArray) -> FloatArray:
     """Variance from flight to flight, from each flight to the next: blind to slow changes.
 
     The largest difference is left out where others remain: it may be a step.
     """
-    squared = (np.diff(motors, axis=0) ** 2).sum(1)
-    own = np.trace(covariances, axis1=1, axis2=2)
-    excess = squared - own[1:] - own[:-1]
-    if len(excess) > 3:
-        excess = np.delete(excess, np.argmax(squared))
-    return max(float(excess.mean()) / 6, 0.0)
+    squared = (np.diff(motors, axis=1) ** 2).sum(2)
+    own = np.trace(covariances, axis1=2, axis2=3)
+    excess = squared - own[:, 1:] - own[:, :-1]
+    total, of = excess.sum(1), excess.shape[1]
+    if of > 3:
+        total -= excess[np.arange(len(excess)), np.argmax(squared, axis=1)]
+        of -= 1
+    return np.asarray(np.maximum(total / of, 0.0) / 6)
 
 
 def _inverse(matrices: FloatArray) -> FloatArray:
@@ -246,7 +287,10 @@ def _times(matrices: FloatArray, vectors: FloatArray) -> FloatArray:
 
 
 class _Sums:
-    """Sums of W, W·m and mᵀ·W·m over some flights; any number of such sums at once."""
+    """Sums of W, W·m and mᵀ·W·m over some flights; any number of such sums at once.
+
+    The flights, or the sums, are the last axis of ``square``, shape (..., k).
+    """
 
     def __init__(
         self, weight: FloatArray, vector: FloatArray, square: FloatArray | None = None
@@ -254,7 +298,7 @@ class _Sums:
         self.weight = weight
         if square is None:
             turned = _times(weight, vector)
-            square = np.einsum("ki,ki->k", vector, turned)
+            square = np.einsum("...i,...i->...", vector, turned)
             vector = turned
         self.vector, self.square = vector, square
 
@@ -264,11 +308,12 @@ class _Sums:
 
     @property
     def whole(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        return self.weight.sum(0), self.vector.sum(0), self.square.sum(0)
+        return self.weight.sum(-3), self.vector.sum(-2), self.square.sum(-1)
 
-    def mean(self, which: int) -> FloatArray:
-        """Mean of the flights of one of the sums."""
-        return np.asarray(np.linalg.solve(self.weight[which], self.vector[which]))
+    def mean(self, rows: IntArray, which: IntArray) -> FloatArray:
+        """Means of the flights of some of the sums, shape (n, 3)."""
+        solved = np.linalg.solve(self.weight[rows, which], self.vector[rows, which][..., None])
+        return np.asarray(solved[..., 0])
 
     def left(self, inverse: FloatArray | None = None) -> FloatArray:
         """Weighted squared distance of the flights from their mean."""
@@ -277,19 +322,34 @@ class _Sums:
         return np.asarray(np.maximum(self.square - explained, 0.0))
 
 
-def _line(share: FloatArray, motors: FloatArray, weights: FloatArray) -> tuple[float, FloatArray]:
-    """Weighted squared distance from the best line in time, and its slope."""
-    design = np.stack([np.ones(len(share)), share], axis=1)
-    normal = np.einsum("ka,kij,kb->aibj", design, weights, design).reshape(6, 6)
-    right = np.einsum("ka,kij,kj->ai", design, weights, motors).reshape(6)
-    line = np.linalg.solve(normal, right).reshape(2, 3)
+def _lines(
+    times: FloatArray, motors: FloatArray, weights: FloatArray
+) -> Iterator[tuple[int, float, FloatArray]]:
+    """The best line in time of each compass with three different times.
+
+    Its weighted squared distance, and its slope.
+    """
+    span = times - times[:, :1]
+    able = np.isfinite(span).all(1) & (np.count_nonzero(np.diff(span, axis=1), axis=1) >= 2)
+    which = np.flatnonzero(able)
+    if not len(which):
+        return
+    motors, weights, share = motors[which], weights[which], span[which] / span[which, -1:]
+    design = np.stack([np.ones_like(share), share], axis=2)
+    powers = design[:, :, :, None] * design[:, :, None, :]
+    normal = np.einsum("nkab,nkij->naibj", powers, weights).reshape(-1, 6, 6)
+    right = np.einsum("nka,nki->nai", design, _times(weights, motors)).reshape(-1, 6, 1)
+    line = np.linalg.solve(normal, right).reshape(-1, 2, 3)
     apart = motors - design @ line
-    return float(np.einsum("ki,kij,kj->", apart, weights, apart)), line[1]
+    left = np.einsum("nki,nki->n", apart, _times(weights, apart))
+    for n, least, (_, slope) in zip(which.tolist(), left.tolist(), line, strict=True):
+        yield n, least, slope
 
 
-def _chance(whole: float, left: float, count: int) -> float:
+def _chance(whole: FloatArray, left: FloatArray | float, count: int) -> FloatArray:
     """Of a change with two vectors in place of one explaining as much where there is none."""
     degrees = 3 * count - 6
     # Never judged by a residual smaller than the flights' own uncertainty makes likely.
-    spread = max(left / degrees, 1.0)
-    return float(special.fdtrc(3, degrees, max(whole - left, 0.0) / 3 / spread))
+    spread = np.maximum(np.asarray(left) / degrees, 1.0)
+    gained = np.maximum(whole - left, 0.0)
+    return np.asarray(special.fdtrc(3, degrees, gained / 3 / spread))

@@ -64,6 +64,16 @@ def test_a_frozen_compass_is_named_with_its_time(sound):
     assert "frozen from 6" in complaint
 
 
+def test_attitudes_that_tell_each_others_time_are_no_reason_to_fail(sound):
+    # As a fuzzed log had it: every attitude twice at one time, and a pause of the compass.
+    attitude = sound.attitude
+    twice = Series(np.repeat(attitude.time, 3), np.repeat(attitude.value, 3, axis=0))
+    field = sound.field[1]
+    keep = (field.time < 20.0) | (field.time > 40.0)
+    paused = replace(with_field(sound, field.value, keep), attitude=twice)
+    assert all("drops out" not in each for each in compass_complaints(paused, 1))
+
+
 def test_a_compass_that_drops_out_is_named(sound):
     field = sound.field[1]
     keep = field.time % 15.0 > 4.0

@@ -11,8 +11,8 @@ from made_flights import DAY, FIRST, MOTOR, fleet, log_of, row, selected
 from magcomp.fleet.aircraft import aircraft
 from magcomp.fleet.as_json import fleet_object
 from magcomp.fleet.as_text import fleet_text
+from magcomp.fleet.findings import Attention, Holds
 from magcomp.fleet.flights import select
-from magcomp.fleet.history import Attention, Holds
 from magcomp.fleet.row import Row, State, without_fit
 from magcomp.fleet.run import Known, key
 from magcomp.fleet.store import table_of

@@ -9,7 +9,8 @@ from made_flights import fleet, row
 from recordings import analysis, recording
 
 from magcomp.analysis import parameter_set
-from magcomp.fleet.history import CompassHistory, Holds
+from magcomp.fleet.findings import Holds
+from magcomp.fleet.history import CompassHistory
 from magcomp.fleet.pooled import Pooled
 from magcomp.fleet.pooled_parameters import pooled_set, with_motor, write_all
 from magcomp.writing.files import read_parameter_file

@@ -1,0 +1,130 @@
+"""What somebody should know of a compass's flights, in words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+
+from magcomp.fleet.flights import Flight
+from magcomp.judge.thresholds import Thresholds
+from magcomp.model import Grade, unit_of
+
+_SETTINGS = slice(3, 12)
+_ALIKE = 1e-3
+
+
+class Attention(IntEnum):
+    """How soon somebody should look."""
+
+    NONE = 0
+    LOOK = 1
+    ACT = 2
+
+
+class Holds(IntEnum):
+    """Whether the calibration in force is still right, going by the newest flight."""
+
+    UNKNOWN = 0
+    YES = 1
+    BARELY = 2
+    NO = 3
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What somebody should know of an aircraft.
+
+    Attributes
+    ----------
+    attention
+        How soon.
+    text
+        A clause, for people.
+    """
+
+    attention: Attention
+    text: str
+
+
+def scattering(slot: int, count: int, degrees: float, at: float, regressor: str) -> Finding:
+    """Flights have no common answer."""
+    return Finding(
+        Attention.LOOK,
+        f"compass {slot}: what the motors add differs between {count} flights by about "
+        f"{degrees:.1f}° of heading at {quantity(at, regressor)}: they have no common answer",
+    )
+
+
+def holds_in(flight: Flight, limits: Thresholds) -> Holds:
+    """Whether the calibration that was in force on a flight was right."""
+    if flight.verdict == Grade.REJECTED or not math.isfinite(flight.before_deg):
+        return Holds.UNKNOWN
+    if flight.before_deg <= limits.good_deg:
+        return Holds.YES
+    return Holds.BARELY if flight.before_deg <= limits.marginal_deg else Holds.NO
+
+
+def of_newest(slot: int, newest: Flight, holds: Holds, limits: Thresholds) -> Iterator[Finding]:
+    """What the newest flight says of the calibration in force, where it is not good."""
+    at = quantity(newest.u_high, newest.regressor)
+    if holds is Holds.NO or holds is Holds.BARELY:
+        yield Finding(
+            Attention.ACT if holds is Holds.NO else Attention.LOOK,
+            f"compass {slot}: the calibration in force does not hold: on {date(newest.when)} the "
+            f"heading was wrong by up to {newest.before_deg:.1f}° at {at} (limit "
+            f"{limits.good_deg:g}°)",
+        )
+    elif newest.verdict == Grade.REJECTED:
+        first = newest.reasons.partition("\n")[0]
+        yield Finding(
+            Attention.LOOK,
+            f"compass {slot}: its newest flight, {date(newest.when)}, gives no answer: {first}",
+        )
+
+
+def changed_since(
+    slot: int, kind: str, when: float, degrees: float, at: float, regressor: str
+) -> Finding:
+    """What the motors add is not what it was."""
+    where = f"{degrees:.1f}° of heading at {quantity(at, regressor)}"
+    if kind == "step":
+        text = f"what the motors add changed on {date(when)} by {where}: was something moved?"
+    else:
+        text = f"what the motors add has drifted since {date(when)} by {where}"
+    return Finding(Attention.ACT, f"compass {slot}: {text}")
+
+
+def why(flight: Flight, others: Sequence[Flight], degrees: float) -> str:
+    """What is different about a flight that disagrees with others, as far as the rows tell."""
+    newest = others[-1]
+    found = [f"{degrees:.1f}° apart"]
+    if flight.verdict == Grade.MARGINAL:
+        found.append(f"marginal: {flight.reasons.partition(chr(10))[0]}")
+    if flight.firmware != newest.firmware:
+        found.append(f"firmware {flight.firmware or 'unknown'}")
+    settings = flight.in_force[_SETTINGS] - newest.in_force[_SETTINGS]
+    if bool((np.abs(settings) > _ALIKE).any()):
+        found.append("another compass calibration was in force")
+    if flight.u_high < min(each.u_high for each in others):
+        found.append(f"only up to {quantity(flight.u_high, flight.regressor)}")
+    if len(found) == 1:
+        found.append("nothing in the log tells why")
+    return ", ".join(found)
+
+
+def quantity(u: float, regressor: str) -> str:
+    """A control quantity for people."""
+    unit = unit_of(regressor)
+    return f"{u:.0f} {unit}" if unit else f"{100 * u:.0f} % throttle"
+
+
+def date(unix_s: float) -> str:
+    """A day, UTC; a question mark where it is unknown or none."""
+    if not math.isfinite(unix_s):
+        return "?"
+    days = np.datetime64(int(unix_s), "s") if abs(unix_s) < 1e11 else None
+    return "?" if days is None else str(days)[:10]
