@@ -34,7 +34,7 @@ FIXTURES = Path(__file__).parents[1] / "sitl_fixtures"
 LOGS = (".tlog", ".bin", ".ulg", ".gz", ".log", ".zip", ".rlog")
 PARAMETERS = (".param", ".params", ".parm")
 OF_A_LOG = ("fit", "check", "info", "report", "heading")
-OF_A_LINK = ("record", "calibrate", "upload", "restore")
+OF_A_LINK = ("record", "calibrate", "sweep", "upload", "restore")
 ENDS = frozenset({ExitCode.GOOD, ExitCode.REJECTED, ExitCode.USAGE})
 ENDS_OF_A_LINK = ENDS | {ExitCode.LINK, ExitCode.TIMEOUT, ExitCode.WRITE, ExitCode.INTERRUPTED}
 

@@ -17,6 +17,7 @@ from magcomp.simulate.local import LocalConnection
 from magcomp.simulate.motion import Motion, Program, rotation, still
 from magcomp.sweeping.events import Event, Outcome, Reason
 from magcomp.sweeping.protocol import SweepSequence
+from magcomp.sweeping.steps import ENOUGH_EACH
 from magcomp.sweeping.watch import Limits
 
 KNOWN = Known("ardupilot", "copter", 1, 1)
@@ -140,6 +141,7 @@ class Bench:
         warm_up_s: float = WARM_UP_S,
         faults: Faults | None = None,
         autopilot: str = "ardupilot",
+        each: float = ENOUGH_EACH,
     ) -> None:
         chosen = scenario(name, seed)
         if program is not None:
@@ -161,6 +163,7 @@ class Bench:
             4,
             most,
             now=self.now,
+            each=each,
             limits=LIMITS,
         )
         self.events: list[tuple[float, Event]] = []

@@ -3,37 +3,17 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from typing import Any
 
 import jsonschema
 import pytest
+from json_schema import SCHEMA, must_be
 from report_analyses import case, still
 from truth import FIXTURES
 
 from magcomp.analysis import Options, check, regressor_in_force
 from magcomp.cli.app import run
 from magcomp.report import as_json
-
-SCHEMA: dict[str, Any] = json.loads(
-    (Path(__file__).parents[1] / "docs" / "schema" / f"magcomp-{as_json.SCHEMA}.json").read_text(
-        encoding="utf-8"
-    )
-)
-
-
-def strict(schema: Any) -> Any:
-    """The schema, where a key that it does not name is a fault."""
-    if isinstance(schema, list):
-        return [strict(each) for each in schema]
-    if not isinstance(schema, dict):
-        return schema
-    named = {key: strict(value) for key, value in schema.items()}
-    return {"additionalProperties": False, **named} if "properties" in schema else named
-
-
-def must_be(command: str, document: object) -> None:
-    jsonschema.validate(document, {**strict(SCHEMA), "$ref": f"#/$defs/{command}"})
 
 
 def printed(document: object) -> Any:
@@ -75,7 +55,7 @@ def test_a_heading_is_as_the_schema_says(capsys: pytest.CaptureFixture[str]) -> 
     must_be("heading", json.loads(capsys.readouterr().out))
 
 
-@pytest.mark.parametrize("command", ["fit", "check", "info", "heading"])
+@pytest.mark.parametrize("command", ["fit", "check", "info", "heading", "fleet"])
 def test_a_key_that_the_schema_does_not_name_is_seen(command: str) -> None:
     with pytest.raises(jsonschema.ValidationError, match="'novelty' was unexpected"):
         must_be(command, {"novelty": 1})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -23,7 +24,7 @@ from magcomp.link import Replay, parse_address
 from magcomp.live.session import LiveSession
 from magcomp.live.sweep import RATES, Bench, make_ready, raise_for_failure
 from magcomp.live.sweep import sweep as carry_out_sweep
-from magcomp.model import CURRENT
+from magcomp.model import CURRENT, MOTORS
 from magcomp.report import words
 from magcomp.sweeping.events import Begun, Event, Outcome, Reason, Stopping, Told
 from magcomp.sweeping.steps import LEAST_MOST, MOST_MOST, MOST_MOTORS
@@ -47,6 +48,13 @@ _DEFAULT_MOST = 50.0
     metavar="N",
     help="How many motors there are; else by the vehicle's parameters.",
 )
+@click.option(
+    "--regressor",
+    type=click.Choice((CURRENT, MOTORS)),
+    default=CURRENT,
+    show_default=True,
+    help="Fit one vector to the whole current, or one to each motor's.",
+)
 @record_option
 @wish_options
 @link_options
@@ -54,6 +62,7 @@ def sweep(
     address: str,
     most: float,
     motors: int | None,
+    regressor: str,
     record_to: Path | None,
     wishes: Wishes,
     link: LinkOptions,
@@ -63,7 +72,7 @@ def sweep(
     THE MOTORS SPIN: take the propellers off, or hold the vehicle down. It begins when the vehicle's
     name is typed. Any key and Ctrl-C stop at once, and so do a lost link, an armed, tilted or moved
     vehicle; where nothing arrives any more, the autopilot itself stops the motors after a second.
-    Then what was recorded is fitted against the current. Nothing is written without --upload.
+    Then what was recorded is fitted. Nothing is written without --upload.
     """
     require_terminal("magcomp sweep")
     if isinstance(parse_address(address, baud=link.baud), Replay):
@@ -86,6 +95,7 @@ def sweep(
         try:
             vehicle = session.wait_ready(link.timeout)
             bench = make_ready(session, motors, most / 100.0)
+            bench = replace(bench, apart=regressor == MOTORS)
         finally:
             status.clear()
         complain(f"Found {words.vehicle(vehicle)}, {bench.motors} motors")
@@ -98,7 +108,7 @@ def sweep(
             complain(f"Recording: {record_to}")
             raise_for_failure(outcome)
             return ExitCode.INTERRUPTED
-        options = Options(method="sweep", regressor=CURRENT, start=begun)
+        options = Options(method="sweep", regressor=regressor, start=begun)
         return finish(session, options, record_to, wishes, link)
 
 

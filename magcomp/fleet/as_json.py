@@ -12,12 +12,14 @@ from magcomp.fleet.answer import Fleet
 from magcomp.fleet.flights import Flight
 from magcomp.fleet.history import CompassHistory
 from magcomp.model import unit_of
+from magcomp.report.as_json import SCHEMA
 
 
 def fleet_object(fleet: Fleet) -> dict[str, Any]:
     """What ``magcomp fleet --json`` prints."""
     return {
         "magcomp": __version__,
+        "schema": SCHEMA,
         "logs": fleet.logs,
         "read": fleet.read,
         "fitted": fleet.fitted,

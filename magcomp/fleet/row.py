@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from enum import StrEnum
 from typing import Any
 
 from magcomp import __version__
-from magcomp.model import Analysis, CompassResult, Recording
+from magcomp.model import Analysis, CompassResult, Correction, Recording
 from magcomp.model.fit import CORRECTION_SIZE, pack
 
 MOTOR_COVARIANCE_SIZE = 6
@@ -200,7 +200,7 @@ def _row(
     fit, verdict = result.fit, result.verdict
     ids = {each.slot: each.device_id for each in recording.vehicle.compasses}
     errors = verdict.heading_error
-    covariance = fit.covariance
+    covariance = fit.shared_covariance
     pairs = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
     return Row(
         **_head(log, digest, recording),
@@ -223,12 +223,17 @@ def _row(
         vertical=float(fit.vertical),
         held_out_before=float(verdict.residual.held_out_before),
         held_out=float(verdict.residual.held_out),
-        correction=tuple(pack(fit.correction).tolist()),
-        in_force=tuple(pack(result.in_force).tolist()),
+        correction=_of_one_part(fit.correction),
+        in_force=_of_one_part(result.in_force),
         motor_covariance=tuple(float(covariance[pair]) for pair in pairs),
         parameters=json.dumps(dict(result.parameters)),
         notes="\n".join(analysis.notes),
     )
+
+
+def _of_one_part(correction: Correction) -> tuple[float, ...]:
+    """The 12 parameters; of a correction motor by motor with the mean of its vectors."""
+    return tuple(pack(replace(correction, motor=correction.vector)).tolist())
 
 
 def _largest(values: Iterable[float]) -> float:

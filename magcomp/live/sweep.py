@@ -27,7 +27,7 @@ from magcomp.model import Recording, Vehicle
 from magcomp.sweeping.events import Event, Outcome, Reason
 from magcomp.sweeping.messages import decode, encode
 from magcomp.sweeping.protocol import SweepSequence
-from magcomp.sweeping.steps import GENTLE, require_possible
+from magcomp.sweeping.steps import ENOUGH_EACH, GENTLE, TOLD_APART, require_possible
 from magcomp.writing.messages import Peer
 from magcomp.writing.writer import Connection
 
@@ -69,11 +69,14 @@ class Bench:
         How many it has.
     most
         Share of the outputs' range of the strongest step.
+    apart
+        Each motor is to get a vector of its own.
     """
 
     vehicle: Vehicle
     motors: int
     most: float
+    apart: bool = False
 
     @property
     def name(self) -> str:
@@ -92,7 +95,8 @@ class Bench:
     def machine(self, now: float) -> SweepSequence:
         """A machine for its sweep."""
         motor_test = autopilots.of(self.vehicle).motor_test
-        return SweepSequence(self.name, motor_test, self.motors, self.most, now=now)
+        each = TOLD_APART if self.apart else ENOUGH_EACH
+        return SweepSequence(self.name, motor_test, self.motors, self.most, now=now, each=each)
 
 
 def make_ready(session: Session, motors: int | None, most: float) -> Bench:

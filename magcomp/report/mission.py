@@ -64,7 +64,7 @@ def mission(errors: FloatArray) -> Mission:
     >>> round(mission(np.zeros(36)).stray_m, 2)
     0.0
     >>> round(mission(np.full(36, np.radians(20.0))).stray_m, 1)
-    6.6
+    6.7
     """
     corners = SIDE_M * np.array([[0.0, 0.0], [0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]])
     share = np.arange(0.0, 1.0, _STEP_M / SIDE_M)[:, np.newaxis]

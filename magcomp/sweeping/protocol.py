@@ -26,7 +26,7 @@ from typing import NamedTuple
 from magcomp.autopilots.motor_test import Command, MotorTest
 from magcomp.sweeping.events import Begun, Event, Outcome, Reason, Stage, Stopping, Told
 from magcomp.sweeping.messages import Answer, Incoming, Said
-from magcomp.sweeping.steps import Measured, Step, next_step, require_possible
+from magcomp.sweeping.steps import ENOUGH_EACH, Measured, Step, next_step, require_possible
 from magcomp.sweeping.watch import CurrentMean, Limits, StillWatch
 
 _Failure = tuple[Reason, str] | None
@@ -48,6 +48,8 @@ class SweepSequence:
         Number of motors, and share of the outputs' range of the strongest step.
     now
         The time, in seconds from anywhere.
+    each
+        How well each motor's slope is to be known, mGauss/A.
     limits
         Lengths of time, and what is borne.
 
@@ -72,12 +74,13 @@ class SweepSequence:
         most: float,
         *,
         now: float,
+        each: float = ENOUGH_EACH,
         limits: Limits | None = None,
     ) -> None:
         require_possible(motors, most)
         self._name = name
         self._test = motor_test
-        self._motors, self._most = motors, most
+        self._motors, self._most, self._each = motors, most, each
         self._limits = limits or Limits()
         self._watch = StillWatch(self._limits)
         self._resting, self._drawing = CurrentMean(), CurrentMean()
@@ -197,8 +200,11 @@ class SweepSequence:
             case _:
                 pass
 
+    def _following(self) -> Step | None:
+        return next_step(self._done, self._motors, self._most, self._each)
+
     def _begin_step(self) -> None:
-        self._step = next_step(self._done, self._motors, self._most)
+        self._step = self._following()
         self._turn = self._owed = 0
         self._heard_text = ""
         self._drawing.begin()
@@ -278,8 +284,7 @@ class SweepSequence:
         return Stage.REST
 
     def _after_rest(self) -> Stage:
-        complete = next_step(self._done, self._motors, self._most) is None
-        return Stage.OVER if complete else Stage.SPIN
+        return Stage.OVER if self._following() is None else Stage.SPIN
 
     def _after_spin(self) -> Stage:
         return Stage.HALT

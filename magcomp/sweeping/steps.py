@@ -27,9 +27,13 @@ _NOISE_MGAUSS = 1.5
 _SLOPE_WIDTH = 10.0
 _LEVEL_WIDTH = 1000.0
 _DRIFT_WIDTH = 1.0
-_ENOUGH_TOTAL, _ENOUGH_EACH = 0.01, 0.1
-"""Standard errors, mGauss/A, of all motors' mean slope and of each one's: at 25 A the mean is known
-to 0.25 mGauss then, less than a tenth of a degree of heading."""
+ENOUGH_EACH, TOLD_APART = 0.1, 0.015
+"""Standard errors, mGauss/A, of each motor's slope: where only their mean is wanted, and where each
+motor gets a vector of its own."""
+
+_ENOUGH_TOTAL = 0.01
+"""Of all motors' mean slope: at 25 A it is known to 0.25 mGauss then, less than a tenth of a degree
+of heading."""
 _EXPONENT = 1.6
 _MOST_ROUNDS = 5
 
@@ -92,7 +96,9 @@ def require_possible(motors: int, most: float) -> None:
         )
 
 
-def next_step(done: Sequence[Measured], motors: int, most: float) -> Step | None:
+def next_step(
+    done: Sequence[Measured], motors: int, most: float, each: float = ENOUGH_EACH
+) -> Step | None:
     """The step that tells most, or None where enough is known.
 
     Parameters
@@ -101,6 +107,8 @@ def next_step(done: Sequence[Measured], motors: int, most: float) -> Step | None
         What was carried out, in order.
     motors, most
         As :func:`require_possible`.
+    each
+        How well each motor's slope is to be known, mGauss/A.
 
     Examples
     --------
@@ -117,7 +125,7 @@ def next_step(done: Sequence[Measured], motors: int, most: float) -> Step | None
         return strong[counts.index(0)]
     alone = counts[:motors]
     tired = len(done) >= _MOST_ROUNDS * (motors + 1)
-    if min(alone) == max(alone) and (tired or _is_enough(done, motors)):
+    if min(alone) == max(alone) and (tired or _is_enough(done, motors, each)):
         return None
     if tired:
         return strong[alone.index(min(alone))]
@@ -175,8 +183,8 @@ def _expected(step: Step, done: Sequence[Measured]) -> float:
     return max(scaled[-1], 0.0) if scaled else 0.0
 
 
-def _is_enough(done: Sequence[Measured], motors: int) -> bool:
+def _is_enough(done: Sequence[Measured], motors: int, each: float) -> bool:
     """Whether the slopes are known well: more than a compass can be read says nothing in flight."""
     slopes = _covariance(done, motors)[2:, 2:]
     total = float(np.sqrt(slopes.mean()))
-    return total <= _ENOUGH_TOTAL and float(np.sqrt(slopes.diagonal().max())) <= _ENOUGH_EACH
+    return total <= _ENOUGH_TOTAL and float(np.sqrt(slopes.diagonal().max())) <= each

@@ -124,3 +124,12 @@ def test_a_field_that_bends_with_the_current_is_seen_and_weighed():
     tried, best = best_of(replace(ALIKE, bend=3.0, swing=12.0))
     assert best == "curved current"
     assert 0.5 < tried[CURRENT].left_deg < 10.0
+
+
+def test_motors_that_the_flight_does_not_tell_apart_are_taken_as_alike():
+    problem = problem_of(replace(ALIKE, apart=0.01), motors=True)
+    found = fit(problem)
+    doubt = np.sqrt(np.diag(found.told_apart)).max()
+    spread = np.ptp(found.correction.motor, axis=1).max()
+    assert doubt > 0.2
+    assert spread < 0.5 * doubt

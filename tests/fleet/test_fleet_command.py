@@ -8,6 +8,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from json_schema import must_be
 from truth import FIXTURES
 
 from magcomp.cli.app import run
@@ -38,6 +39,7 @@ def test_a_fleet_from_folder_to_answer(
     first = json.loads(capsys.readouterr().out)
     assert (first["logs"], first["read"], first["fitted"], first["copies"]) == (4, 4, 1, 1)
     assert {Path(each["log"]).name for each in first["unusable"]} == {"c.BIN", "d.log"}
+    must_be("fleet", first)
     (found,) = first["aircraft"]
     assert found["device_ids"] == [97539, 131874, 263178]
     truth = json.loads((FIXTURES / "sweep_current.json").read_text())["mot_mgauss_per_amp"]

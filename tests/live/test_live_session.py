@@ -245,8 +245,8 @@ def test_another_vehicle_s_parameters_are_refused():
         session.wait_ready(PATIENCE_S)
         with pytest.raises(VehicleRefusedError, match="1234"):
             session.upload_plan(theirs)
-        with pytest.raises(WriteError, match="COMPASS_MOT9_X"):
-            session.upload_plan(ParameterSet({"COMPASS_MOT9_X": 1.0}), any_vehicle=True)
+        with pytest.raises(WriteError, match="CAL_MAG0_XOFF must exist on the vehicle"):
+            session.upload_plan(ParameterSet({"CAL_MAG0_XOFF": 1.0}), any_vehicle=True)
 
 
 # ---------------------------------------------------------------- what goes wrong

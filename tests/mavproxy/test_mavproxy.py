@@ -21,6 +21,9 @@ from magcomp.mavproxy.carried import CarriedTransport
 from magcomp.model import ParameterSet
 from magcomp.writing.files import read_parameter_file, write_parameter_file
 
+SPEED = 3.0
+"""Beyond that pymavlink, which reads for MAVProxy, does not keep up on a busy machine."""
+
 
 class FakeModule:
     """As much of MAVProxy's MPModule as a module may use."""
@@ -109,7 +112,10 @@ class Prompt:
 
 
 def test_it_is_loaded_listens_and_tells_what_it_can(capsys: pytest.CaptureFixture[str]) -> None:
-    with alive(vehicle=landed()) as flown, FakeMavproxy(flown.address).running() as mavproxy:
+    with (
+        alive(vehicle=landed(), speed=SPEED) as flown,
+        FakeMavproxy(flown.address).running() as mavproxy,
+    ):
         prompt = Prompt(mavproxy, capsys)
         assert mavproxy.module.name == "magcomp"
         assert "status" in mavproxy.completions["magcomp"]
@@ -128,7 +134,7 @@ def test_a_flight_is_fitted_written_and_undone(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     with (
-        alive("sweep", speed=10.0, wait_for_ground=True) as flown,
+        alive("sweep", speed=SPEED) as flown,
         FakeMavproxy(flown.address).running() as mavproxy,
     ):
         prompt = Prompt(mavproxy, capsys)
@@ -142,7 +148,7 @@ def test_a_flight_is_fitted_written_and_undone(
         wanted = read_parameter_file(tmp_path / "a.parm").values
         assert "Nothing is written yet: magcomp write yes" in prompt("magcomp write")
         assert held(flown.vehicle) == before
-        assert "To undo this: magcomp undo" in prompt.until("magcomp write yes", "Written and read")
+        assert "To undo this: magcomp undo" in prompt("magcomp write yes")
         assert flown.vehicle.parameters["COMPASS_MOT_X"] == wanted["COMPASS_MOT_X"]
         assert "nothing is written" in prompt("magcomp write yes")
         assert "magcomp undo yes" in prompt("magcomp undo")
@@ -157,7 +163,10 @@ def test_a_backup_is_brought_back_by_its_path(
 ) -> None:
     vehicle = landed()
     backup = tmp_path / "b.param"
-    with alive(vehicle=vehicle) as flown, FakeMavproxy(flown.address).running() as mavproxy:
+    with (
+        alive(vehicle=vehicle, speed=SPEED) as flown,
+        FakeMavproxy(flown.address).running() as mavproxy,
+    ):
         prompt = Prompt(mavproxy, capsys)
         prompt.until("magcomp status", "calibration is read")
         ids = {f"COMPASS_DEV_ID{n}": vehicle.parameters[f"COMPASS_DEV_ID{n}"] for n in ("", 2, 3)}
