@@ -28,7 +28,7 @@ class ErrorRow:
     before, after, bound
         Now, corrected, and corrected at most with 95 % probability.
     covered
-        The recording reached this control quantity.
+        The recording was flown at this control quantity.
     """
 
     label: str
@@ -47,7 +47,7 @@ def error_rows(result: CompassResult) -> tuple[ErrorRow, ...]:
             row.before,
             row.after,
             row.p95,
-            row.u <= covered.u_high or row.u == 0.0,
+            words.is_flown(row.u, covered.u_low, covered.u_high),
         )
         for row in result.verdict.heading_error
     )
