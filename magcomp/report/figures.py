@@ -32,6 +32,7 @@ from magcomp.report.figure import (
 )
 from magcomp.report.figures_cloud import cloud
 from magcomp.report.figures_flight import missions, strip
+from magcomp.report.shift import shift_of
 
 _MEDIANS = 12
 _LEAST_IN_MEDIAN = 8
@@ -113,22 +114,14 @@ def heading_error(result: CompassResult, quantity: Quantity) -> Figure:
 
 def shift(result: CompassResult, quantity: Quantity) -> Figure:
     """Shift of the field by control quantity, an axis a line: field against control quantity."""
-    fit = result.fit
-    shape = fit.correction.soft_iron
-    u = np.array([level.u for level in fit.levels])
-    rest = fit.correction.centre(0.0)
-    found = np.array([shape @ (level.centre - rest) for level in fit.levels]).reshape(-1, 3)
-    std = np.array(
-        [np.sqrt(np.diag(shape @ lv.covariance @ shape.T)) for lv in fit.levels]
-    ).reshape(-1, 3)
-    ends = np.array([0.0, max(fit.u_high, float(u.max(initial=0.0)))])
+    of = shift_of(result.fit)
     data: list[Trace] = []
     for index, name in enumerate(AXIS_NAMES):
         colour = AXIS_COLOURS[index]
         data.append(
             line(
-                quantity.values(ends),
-                rounded(ends * fit.interference[index], 2),
+                rounded(of.ends, 2),
+                rounded(of.lines[:, index], 2),
                 name,
                 colour,
                 dash=AXIS_DASHES[index],
@@ -141,9 +134,13 @@ def shift(result: CompassResult, quantity: Quantity) -> Figure:
             {
                 "type": "scatter",
                 "mode": "markers",
-                "x": quantity.values(u),
-                "y": rounded(found[:, index], 2),
-                "error_y": {"array": rounded(1.96 * std[:, index], 2), "color": colour, "width": 3},
+                "x": rounded(of.u, 2),
+                "y": rounded(of.centres[:, index], 2),
+                "error_y": {
+                    "array": rounded(1.96 * of.std[:, index], 2),
+                    "color": colour,
+                    "width": 3,
+                },
                 "name": name,
                 "marker": marker,
                 "legendgroup": name,

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from magcomp.model import CompassResult, FloatArray, quantity_of
+from magcomp.model import CompassResult, FloatArray
 from magcomp.report import words
 from magcomp.report.evidence import CompassPlots
+from magcomp.report.shift import Shift, shift_of
 
 AXIS_WORDS = ("forward", "right", "down")
 AXES = tuple(word[0] for word in AXIS_WORDS)
@@ -27,7 +28,7 @@ class ErrorRow:
     before, after, bound
         Now, corrected, and corrected at most with 95 % probability.
     covered
-        The recording reached this control quantity.
+        The recording was flown at this control quantity.
     """
 
     label: str
@@ -46,52 +47,9 @@ def error_rows(result: CompassResult) -> tuple[ErrorRow, ...]:
             row.before,
             row.after,
             row.p95,
-            row.u <= covered.u_high or row.u == 0.0,
+            words.is_flown(row.u, covered.u_low, covered.u_high),
         )
         for row in result.verdict.heading_error
-    )
-
-
-@dataclass(frozen=True, eq=False)
-class Shift:
-    """The paper's picture: how far the centre moves, by control quantity, an axis a line.
-
-    Attributes
-    ----------
-    u
-        Control quantity of each centre, amperes or per cent, shape (k,).
-    centres
-        Shift of each centre from its place at rest, in the corrected field, mGauss, shape (k, 3).
-    ends
-        Control quantities at which the lines begin and end, shape (2,).
-    lines
-        The fitted interference there, mGauss, shape (2, 3).
-    title
-        What stands under the picture.
-    """
-
-    u: FloatArray
-    centres: FloatArray
-    ends: FloatArray
-    lines: FloatArray
-    title: str
-
-
-def shift(result: CompassResult) -> Shift:
-    """Centres and line of one compass; docs/method.md, Fig. 4, seen along each axis."""
-    fit = result.fit
-    quantity = quantity_of(fit.regressor)
-    scale = quantity.scale
-    rest = fit.correction.centre(0.0)
-    u = np.array([level.u for level in fit.levels])
-    moved = [fit.correction.soft_iron @ (level.centre - rest) for level in fit.levels]
-    ends = np.array([0.0, max(fit.u_high, float(u.max(initial=0.0)))])
-    return Shift(
-        u=scale * u,
-        centres=np.array(moved).reshape(-1, 3),
-        ends=scale * ends,
-        lines=np.outer(ends, fit.interference),
-        title=f"{quantity.name}, {quantity.shown_unit}",
     )
 
 
@@ -143,7 +101,7 @@ class CompassPicture:
 
 def picture(result: CompassResult, plots: CompassPlots) -> CompassPicture:
     """Make the pictures of one compass; runs beside the fit, off the screen's thread."""
-    return CompassPicture(result, error_rows(result), shift(result), unexplained(plots))
+    return CompassPicture(result, error_rows(result), shift_of(result.fit), unexplained(plots))
 
 
 def round_ticks(low: float, high: float, most: int) -> list[float]:

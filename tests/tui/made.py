@@ -35,7 +35,8 @@ from magcomp.model import (
     compasses_of,
 )
 from magcomp.model import Coverage as Covered
-from magcomp.tui.pictures import CompassPicture, Unexplained, error_rows, shift
+from magcomp.report.shift import shift_of
+from magcomp.tui.pictures import CompassPicture, Unexplained, error_rows
 from magcomp.tui.vehicle_card import card_of_recording
 from magcomp.tui.work import Work
 
@@ -190,7 +191,8 @@ def pictures(of: Analysis) -> dict[int, CompassPicture]:
     wave = np.abs(np.sin(time / 15.0))
     unexplained = Unexplained(time, 5.0 + 50.0 * wave, 1.0 + wave)
     return {
-        c.fit.compass: CompassPicture(c, error_rows(c), shift(c), unexplained) for c in of.compasses
+        c.fit.compass: CompassPicture(c, error_rows(c), shift_of(c.fit), unexplained)
+        for c in of.compasses
     }
 
 

@@ -51,5 +51,5 @@ Rows with `*` were not reached in the recording: they are extrapolated.
                 )
             )
         if any(not row.covered for row in data):
-            lines.append(Content.styled("  * beyond what was recorded", "$quiet"))
+            lines.append(Content.styled("  * reckoned, not flown", "$quiet"))
         return Content("\n").join(lines)

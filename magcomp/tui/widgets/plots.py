@@ -9,7 +9,8 @@ from __future__ import annotations
 from textual.color import Color
 from textual_plotext import PlotextPlot
 
-from magcomp.tui.pictures import AXES, Shift, Unexplained, round_ticks
+from magcomp.report.shift import Shift
+from magcomp.tui.pictures import AXES, Unexplained, round_ticks
 
 AXIS_COLOURS = ("error", "success", "primary")
 """Of forward, right and down, as names in the theme; the letters say the same."""
