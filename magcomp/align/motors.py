@@ -7,8 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from magcomp.align.control import POWERS, duty_of, rebuild, reported, smoothed
-from magcomp.align.sample import interpolate
-from magcomp.model import DRIVE, MOTORS, Control, Recording, Series
+from magcomp.model import DRIVE, MOTORS, Control, Recording, Series, interpolate
 
 SMOOTHINGS_S = (0.0, 0.05)
 """Time constants with which a motor may follow its output; the fit decides."""
