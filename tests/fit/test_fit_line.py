@@ -23,7 +23,7 @@ from magcomp.fit.line import (
 )
 from magcomp.model import Level
 
-SEEDS = range(24)
+SEEDS = range(40)
 POSITIONS = np.array([0.0, 25.0, 50.0, 75.0, 100.0])
 POINT = np.array([12.0, -30.0, 45.0])
 STEEP = np.array([0.4, -0.3, 0.87])
