@@ -38,6 +38,7 @@ from magcomp.autopilots.ardupilot_names import (
     suffix,
     vector_names,
 )
+from magcomp.autopilots.ardupilot_recording import LINK_MESSAGES, LOG_BITS
 from magcomp.autopilots.motor_test import ArduPilotMotorTest
 from magcomp.autopilots.terms import (
     FieldMeaning,
@@ -80,34 +81,7 @@ _LINK = LagPriors(LagPrior(0.08, 0.1), LagPrior(0.08, 0.1))
 _LOGGED = LagPriors(LagPrior(0.05, 0.05), LagPrior(0.05, 0.1))
 """A reading is the mean over one update of 0.1 s, and is logged when it is made."""
 
-
 _WITHOUT_THROTTLE = frozenset(["plane", "rover", "boat"])
-
-_ALL_CURRENTS = (
-    "make battery 0 the sum of all (the BATT_MONITOR that sums selected monitors), and record again"
-)
-_LOG_BITS = {
-    "compass": "set the COMPASS bit of LOG_BITMASK and COMPASS_ENABLE to 1, and record again",
-    "more readings": "record longer",
-    "control": (
-        "set the CURRENT and CTUN bits of LOG_BITMASK and give the log as the vehicle wrote it"
-    ),
-    "current": "set up a current sensor (BATT_MONITOR) and set the CURRENT bit of LOG_BITMASK",
-    "all currents": _ALL_CURRENTS,
-    "attitude": "set the ATTITUDE bit of LOG_BITMASK, and record again",
-    "parameters": "give the whole log, which has them at its beginning",
-    "position": "set the GPS bit of LOG_BITMASK, and record where satellites are seen",
-}
-_LINK_MESSAGES = {
-    "compass": "ask for RAW_IMU, SCALED_IMU2 or SCALED_IMU3 at 10 Hz, with COMPASS_ENABLE 1",
-    "more readings": "record longer, or ask for RAW_IMU, SCALED_IMU2 or SCALED_IMU3 at 10 Hz",
-    "control": "was the vehicle ever armed, and does the link carry BATTERY_STATUS or VFR_HUD?",
-    "current": "set up a current sensor (BATT_MONITOR) and ask for BATTERY_STATUS at 10 Hz",
-    "all currents": _ALL_CURRENTS,
-    "attitude": "ask for ATTITUDE at 20 Hz",
-    "parameters": "let the ground station read all parameters while it records",
-    "position": "ask for GLOBAL_POSITION_INT, and record where satellites are seen",
-}
 
 
 class ArduPilot:
@@ -362,7 +336,7 @@ class ArduPilot:
 
     def how_to_record(self, quantity: str, source_format: str) -> str:
         """A bit of LOG_BITMASK for its own log, a message for telemetry."""
-        asked = _LOG_BITS if source_format == "dataflash" else _LINK_MESSAGES
+        asked = LOG_BITS if source_format == "dataflash" else LINK_MESSAGES
         return asked[quantity]
 
     def link_notes(self, compasses: int) -> tuple[str, ...]:  # noqa: ARG002
