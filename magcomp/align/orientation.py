@@ -55,11 +55,12 @@ def orientation_complaint(recording: Recording, samples: Samples, earth: EarthFi
 def right_turn(samples: Samples, earth: EarthField) -> int | None:
     """The number of the turn that makes the readings fit gravity; None where no one does."""
     every = max(1, len(samples.time) // _MOST_ROWS)
-    raw, down, u = samples.raw[::every], samples.down[::every], samples.u[::every]
+    few = samples.where(np.arange(len(samples.time)) % every == 0)
+    down = few.down
     vertical = earth.strength * np.sin(earth.dip)
-    known = np.concatenate([down, *(down * part[:, None] for part in u.T)], axis=1)
+    known = np.concatenate([down, *(down * part[:, None] for part in few.u.T)], axis=1)
     left = {
-        number: _left(known, np.einsum("ij,ij->i", down, raw @ turned.T) - vertical)
+        number: _left(known, np.einsum("ij,ij->i", down, few.raw @ turned.T) - vertical)
         for number, turned in right_angles().items()
     }
     best = min(left, key=lambda number: left[number])

@@ -139,7 +139,11 @@ def analyse(
     plain: dict[str, tuple[float, ...]] = {}
     for kind in kinds:
         forms = [control for control in (*found, *motors) if control.kind == kind]
-        if kind == THROTTLE and CURRENT in judged and (left := beaten(judged[CURRENT], forms)):
+        if (
+            quantity_of(kind).is_throttle
+            and CURRENT in judged
+            and (left := beaten(judged[CURRENT], forms))
+        ):
             plain[kind] = left
             continue
         for compass in compasses:

@@ -229,8 +229,11 @@ def fit_alike(problem: Problem, fit: MotorFit) -> MotorFit:
     """
     free = _groups(fit)
     begin = parameters_of(fit, fit.lags)
-    begin[MOTOR] = begin[SIZE:] = 0.0
-    found = estimate(problem, free, start=begin, with_covariance=False)
+    # The same field from another quantity: so much per unit that its range gives what the other's.
+    of_range = float(np.quantile(problem.control.total.value, 0.98)) or 1.0
+    begin[MOTOR] *= fit.u_high / of_range
+    begin[SIZE:] = 0.0
+    found = estimate(problem, free, start=begin, with_covariance=False, rounds=_QUICK)
     errors = errors_of(problem.sample(lags_of(found.parameters)), found.parameters)
     found = estimate(
         problem, free, start=found.parameters, errors=errors, with_covariance=False, rounds=_QUICK
