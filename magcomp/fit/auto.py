@@ -118,7 +118,9 @@ def fit(problem: Problem, method: str = "auto") -> MotorFit:
         count = len(np.unique(level))
         if count >= 2 and (method == "levels" or len(rows) > 0.4 * len(samples)):
             found = _with_lags(problem, fit_levels(problem, rows, level)[0])
-            return found if method == "levels" else _surer(found, fit_flight(problem))
+            if method == "levels" or _doubt_of_centre(found) <= CERTAIN_MGAUSS:
+                return found
+            return _surer(found, fit_flight(problem))
         if method == "levels":
             raise FitRejectedError(
                 "The method of levels needs turns about all axes at two or more steady levels of "
@@ -169,7 +171,7 @@ def _surer(by_levels: MotorFit, by_flight: MotorFit) -> MotorFit:
 
     Turns that hardly cover each level leave its ellipsoid's centre free; gravity then tells more.
     """
-    if _doubt_of_centre(by_levels) <= max(_doubt_of_centre(by_flight), CERTAIN_MGAUSS):
+    if _doubt_of_centre(by_levels) <= _doubt_of_centre(by_flight):
         return by_levels
     why = "gravity tells more of this log than the turns at steady levels alone"
     return replace(by_flight, why=f"{why}; {by_flight.why}")
