@@ -10,14 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from magcomp.simulate.flight import GRAVITY
-from magcomp.simulate.moment import Moment
 from magcomp.simulate.motion import euler
+from magcomp.simulate.shared_telemetry import (
+    ABSENT_VOLTAGE,
+    BUILDERS,
+    Known,
+    cut,
+    imu_fields,
+    servo_output_raw,
+)
 from magcomp.simulate.truth import MOTORS
 
 FloatArray = NDArray[np.float64]
 
-_ABSENT_VOLTAGE = 65535
 _IMU_TEMPERATURE = 3500
 _SENSORS = 1_399_979_055
 _SENSORS_ENABLED = 1_130_470_447
@@ -43,13 +48,11 @@ class Battery:
 
 
 @dataclass(frozen=True, eq=False)
-class View(Moment):
+class View(Known):
     """What the autopilot knows at one step.
 
     Attributes
     ----------
-    attitude
-        Estimated roll, pitch and yaw at that step, radians, shape (3,).
     corrected
         Corrected field of each compass, mGauss, shape (3, 3).
     demand
@@ -60,7 +63,6 @@ class View(Moment):
         The battery monitor.
     """
 
-    attitude: FloatArray
     corrected: FloatArray
     demand: float
     outputs: FloatArray
@@ -72,44 +74,26 @@ def build(message: int, view: View) -> Any | None:
     return _BUILDERS[message](view)
 
 
-def cut(value: FloatArray) -> list[int]:
-    """Cut towards zero and keep within 16 bits, as the firmware's conversion does."""
-    return [min(max(int(each), -32768), 32767) for each in value.tolist()]
-
-
 def _centiamperes(battery: Battery) -> int:
     return min(int(battery.current * 100.0), 32767)
 
 
-def _attitude(view: View) -> Any:
-    roll, pitch, yaw = view.attitude.tolist()
-    rates = view.block.gyro[0, view.step].tolist()
-    return mavlink.MAVLink_attitude_message(view.boot_ms, roll, pitch, yaw, *rates)
-
-
 def _servo_output_raw(view: View) -> Any:
     outputs = [round(value) for value in view.outputs] + [0] * (16 - MOTORS)
-    return mavlink.MAVLink_servo_output_raw_message(
-        view.boot_us & 0xFFFFFFFF, 0, *outputs[:8], *outputs[8:]
-    )
-
-
-def _imu_fields(view: View, imu: int) -> list[int]:
-    accel = cut(view.block.accel[imu, view.step] * 1000.0 / GRAVITY)
-    return accel + cut(view.block.gyro[imu, view.step] * 1000.0)
+    return servo_output_raw(view, outputs)
 
 
 def _raw_imu(view: View) -> Any:
     mag = cut(view.corrected[0])
     return mavlink.MAVLink_raw_imu_message(
-        view.boot_us, *_imu_fields(view, 0), *mag, 0, _IMU_TEMPERATURE
+        view.boot_us, *imu_fields(view, 0), *mag, 0, _IMU_TEMPERATURE
     )
 
 
 def _scaled_imu2(view: View) -> Any:
     mag = cut(view.corrected[1])
     return mavlink.MAVLink_scaled_imu2_message(
-        view.boot_ms, *_imu_fields(view, 1), *mag, _IMU_TEMPERATURE
+        view.boot_ms, *imu_fields(view, 1), *mag, _IMU_TEMPERATURE
     )
 
 
@@ -148,7 +132,7 @@ def _battery_status(view: View) -> Any | None:
     battery = view.battery
     if battery is None:
         return None
-    cell_voltages = [round(battery.voltage * 1e3)] + [_ABSENT_VOLTAGE] * 9
+    cell_voltages = [round(battery.voltage * 1e3)] + [ABSENT_VOLTAGE] * 9
     return mavlink.MAVLink_battery_status_message(
         id=0,
         battery_function=0,
@@ -187,31 +171,8 @@ def _ekf_status_report(view: View) -> Any:  # noqa: ARG001
     return mavlink.MAVLink_ekf_status_report_message(_EKF_FLAGS, 0.03, 0.01, 0.01, 0.03, 0.0)
 
 
-def _global_position_int(view: View) -> Any:
-    latitude, longitude, altitude = view.geodetic()
-    return mavlink.MAVLink_global_position_int_message(
-        view.boot_ms,
-        latitude,
-        longitude,
-        round(altitude * 1e3),
-        round((altitude - view.home[2]) * 1e3),
-        *cut(view.velocity * 100.0),
-        int(np.degrees(view.attitude[2]) % 360.0 * 100.0),
-    )
-
-
-def _local_position_ned(view: View) -> Any:
-    return mavlink.MAVLink_local_position_ned_message(
-        view.boot_ms, *view.position.tolist(), *view.velocity.tolist()
-    )
-
-
-def _system_time(view: View) -> Any:
-    return mavlink.MAVLink_system_time_message(round(view.unix_s * 1e6), view.boot_ms)
-
-
 _BUILDERS: Mapping[int, Callable[[View], Any | None]] = {
-    mavlink.MAVLINK_MSG_ID_ATTITUDE: _attitude,
+    **BUILDERS,
     mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: _servo_output_raw,
     mavlink.MAVLINK_MSG_ID_RAW_IMU: _raw_imu,
     mavlink.MAVLINK_MSG_ID_SCALED_IMU2: _scaled_imu2,
@@ -221,7 +182,4 @@ _BUILDERS: Mapping[int, Callable[[View], Any | None]] = {
     mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: _battery_status,
     mavlink.MAVLINK_MSG_ID_SYS_STATUS: _sys_status,
     mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT: _ekf_status_report,
-    mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: _global_position_int,
-    mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: _local_position_ned,
-    mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: _system_time,
 }

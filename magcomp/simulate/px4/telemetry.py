@@ -15,9 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from magcomp.simulate.flight import GRAVITY
-from magcomp.simulate.moment import Moment
-from magcomp.simulate.telemetry import cut
+from magcomp.simulate.shared_telemetry import (
+    ABSENT_VOLTAGE,
+    BUILDERS,
+    Known,
+    cut,
+    imu_fields,
+    servo_output_raw,
+)
 from magcomp.simulate.truth import MOTORS
 
 FloatArray = NDArray[np.float64]
@@ -25,7 +30,6 @@ FloatArray = NDArray[np.float64]
 _MGAUSS = 1000.0
 _OUTPUTS = 16
 _DISARMED_US, _LOW_US, _SPAN_US = 900, 1000.0, 1000.0
-_ABSENT_VOLTAGE = 65535
 _SENSORS = 35684397
 _SENSORS_ENABLED = 35749933
 _SENSORS_HEALTHY = 840990783
@@ -58,13 +62,11 @@ class Battery:
 
 
 @dataclass(frozen=True, eq=False)
-class View(Moment):
+class View(Known):
     """What PX4 knows at one step.
 
     Attributes
     ----------
-    attitude
-        Estimated roll, pitch and yaw, radians, shape (3,).
     raw
         Last reading of each sensor in its own axes, gauss, shape (3, 3).
     field
@@ -77,7 +79,6 @@ class View(Moment):
         The first battery.
     """
 
-    attitude: FloatArray
     raw: FloatArray
     field: FloatArray
     thrust: float
@@ -95,10 +96,8 @@ def _mgauss(view: View, sensor: int) -> list[int]:
 
 
 def _scaled_imu(view: View) -> Any:
-    accel = cut(view.block.accel[0, view.step] * 1000.0 / GRAVITY)
-    gyro = cut(view.block.gyro[0, view.step] * 1000.0)
     return mavlink.MAVLink_scaled_imu_message(
-        view.boot_ms, *accel, *gyro, *_mgauss(view, 0), _TEMPERATURE
+        view.boot_ms, *imu_fields(view, 0), *_mgauss(view, 0), _TEMPERATURE
     )
 
 
@@ -131,11 +130,6 @@ def _highres_imu(view: View) -> Any:
         temperature=_TEMPERATURE / 100.0,
         fields_updated=_EVERYTHING_NEW if view.step == 0 else _IMU_NEW,
     )
-
-
-def _attitude(view: View) -> Any:
-    rates = view.block.gyro[0, view.step].tolist()
-    return mavlink.MAVLink_attitude_message(view.boot_ms, *view.attitude.tolist(), *rates)
 
 
 def _quaternion(roll: float, pitch: float, yaw: float) -> list[float]:
@@ -176,9 +170,7 @@ def _outputs(view: View) -> list[float]:
 
 def _servo_output_raw(view: View) -> Any:
     outputs = [round(value) for value in _outputs(view)]
-    return mavlink.MAVLink_servo_output_raw_message(
-        view.boot_us & 0xFFFFFFFF, 0, *outputs[:8], *outputs[8:]
-    )
+    return servo_output_raw(view, outputs)
 
 
 def _actuator_output_status(view: View) -> Any:
@@ -200,7 +192,7 @@ def _vfr_hud(view: View) -> Any:
 
 def _battery_status(view: View) -> Any:
     battery = view.battery
-    voltages = [round(battery.voltage * 1e3)] + [_ABSENT_VOLTAGE] * 9
+    voltages = [round(battery.voltage * 1e3)] + [ABSENT_VOLTAGE] * 9
     return mavlink.MAVLink_battery_status_message(
         id=0,
         battery_function=1,
@@ -256,25 +248,6 @@ def _gps_raw_int(view: View) -> Any:
     )
 
 
-def _global_position_int(view: View) -> Any:
-    latitude, longitude, altitude = view.geodetic()
-    return mavlink.MAVLink_global_position_int_message(
-        view.boot_ms,
-        latitude,
-        longitude,
-        round(altitude * 1e3),
-        round((altitude - view.home[2]) * 1e3),
-        *cut(view.velocity * 100.0),
-        int(np.degrees(view.attitude[2]) % 360.0 * 100.0),
-    )
-
-
-def _local_position_ned(view: View) -> Any:
-    return mavlink.MAVLink_local_position_ned_message(
-        view.boot_ms, *view.position.tolist(), *view.velocity.tolist()
-    )
-
-
 def _altitude(view: View) -> Any:
     altitude = view.geodetic()[2]
     above = altitude - view.home[2]
@@ -309,16 +282,12 @@ def _ping(view: View) -> Any:
     return mavlink.MAVLink_ping_message(view.boot_us, 0, 0, 0)
 
 
-def _system_time(view: View) -> Any:
-    return mavlink.MAVLink_system_time_message(round(view.unix_s * 1e6), view.boot_ms)
-
-
 _BUILDERS: Mapping[int, Callable[[View], Any]] = {
+    **BUILDERS,
     mavlink.MAVLINK_MSG_ID_SCALED_IMU: _scaled_imu,
     mavlink.MAVLINK_MSG_ID_SCALED_IMU2: _scaled_imu2,
     mavlink.MAVLINK_MSG_ID_SCALED_IMU3: _scaled_imu3,
     mavlink.MAVLINK_MSG_ID_HIGHRES_IMU: _highres_imu,
-    mavlink.MAVLINK_MSG_ID_ATTITUDE: _attitude,
     mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: _attitude_quaternion,
     mavlink.MAVLINK_MSG_ID_ATTITUDE_TARGET: _attitude_target,
     mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: _servo_output_raw,
@@ -327,12 +296,9 @@ _BUILDERS: Mapping[int, Callable[[View], Any]] = {
     mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: _battery_status,
     mavlink.MAVLINK_MSG_ID_SYS_STATUS: _sys_status,
     mavlink.MAVLINK_MSG_ID_GPS_RAW_INT: _gps_raw_int,
-    mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: _global_position_int,
-    mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: _local_position_ned,
     mavlink.MAVLINK_MSG_ID_ALTITUDE: _altitude,
     mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: _extended_sys_state,
     mavlink.MAVLINK_MSG_ID_SCALED_PRESSURE: _scaled_pressure,
     mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS: _estimator_status,
     mavlink.MAVLINK_MSG_ID_PING: _ping,
-    mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: _system_time,
 }
