@@ -68,11 +68,7 @@ def calibrate(
         address,
         record=record_to,
         force=wishes.force,
-        system=link.system,
-        component=link.component,
-        baud=link.baud,
-        signing_key=link.key,
-        source_system=link.source_system,
+        **link.reach,
         options=options,
     ) as session:
         session.manoeuvre = None if manoeuvre is None else Manoeuvre(manoeuvre)

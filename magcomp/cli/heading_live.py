@@ -68,11 +68,7 @@ def follow(address: str, link: LinkOptions, wanted: Following) -> ExitCode:
         stop_on_interrupt() as stop,
         LiveSession.open(
             address,
-            system=link.system,
-            component=link.component,
-            baud=link.baud,
-            signing_key=link.key,
-            source_system=link.source_system,
+            **link.reach,
             refit_share=0.0,
         ) as session,
     ):

@@ -11,7 +11,7 @@ import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TypeVar
+from typing import TypedDict, TypeVar
 
 import click
 
@@ -56,6 +56,16 @@ any_vehicle_option = click.option(
 )
 
 
+class Reach(TypedDict):
+    """What a live session is opened with, so that it finds the vehicle."""
+
+    system: int | None
+    component: int | None
+    baud: int | None
+    signing_key: bytes | None
+    source_system: int
+
+
 @dataclass(frozen=True)
 class LinkOptions:
     """How to reach a vehicle.
@@ -84,6 +94,17 @@ class LinkOptions:
     timeout: float
     source_system: int = GROUND_STATION_SYSTEM
     key_file: Path | None = None
+
+    @property
+    def reach(self) -> Reach:
+        """The same, as ``LiveSession.open`` takes it."""
+        return {
+            "system": self.system,
+            "component": self.component,
+            "baud": self.baud,
+            "signing_key": self.key,
+            "source_system": self.source_system,
+        }
 
     @property
     def options(self) -> tuple[str, ...]:

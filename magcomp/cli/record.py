@@ -55,11 +55,7 @@ def record(
             address,
             record=output,
             force=force,
-            system=link.system,
-            component=link.component,
-            baud=link.baud,
-            signing_key=link.key,
-            source_system=link.source_system,
+            **link.reach,
             refit_share=0.0,
         ) as session,
     ):

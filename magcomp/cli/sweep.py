@@ -82,11 +82,7 @@ def sweep(
         address,
         record=record_to,
         force=wishes.force,
-        system=link.system,
-        component=link.component,
-        baud=link.baud,
-        signing_key=link.key,
-        source_system=link.source_system,
+        **link.reach,
         rates=RATES,
         refit_share=0.0,
     ) as session:
