@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -70,15 +70,11 @@ def _left_by(by_current: Sequence[Judged], forms: Sequence[Control]) -> list[flo
     left = []
     for each in by_current:
         with solvable(each.fit.compass):
-            problem = best_form([_against(each.problem, form) for form in forms])
+            problem = best_form([replace(each.problem, control=form) for form in forms])
             forms = [problem.control]
             residual, _ = field_residual(problem, fit_alike(problem, each.fit))
         left.append(residual.held_out)
     return left
-
-
-def _against(problem: Problem, control: Control) -> Problem:
-    return Problem(problem.readings, control, problem.in_force, problem.earth)
 
 
 def better(judged: Mapping[str, Sequence[Judged]]) -> str:

@@ -13,13 +13,14 @@ from dataclasses import replace
 import numpy as np
 
 from magcomp.fit.robust import recorded_time, time_blocks
-from magcomp.fit.sweep import STILL_WOBBLE_RAD, is_still
+from magcomp.fit.sweep import STILL_WOBBLE_RAD, from_block_mean, is_still
 from magcomp.model import (
     CORRECTION_SIZE,
     MOTOR,
     SOFT_IRON,
     BoolArray,
     FloatArray,
+    IntArray,
     MotorFit,
     Samples,
     pack,
@@ -69,13 +70,12 @@ def still_rows(samples: Samples) -> BoolArray | None:
     return np.asarray(best)
 
 
-def _quiet_blocks(samples: Samples, block: np.ndarray) -> BoolArray:
+def _quiet_blocks(samples: Samples, block: IntArray) -> BoolArray:
     """Whether roll and pitch stay where they are, for each block."""
     count = np.maximum(np.bincount(block), 1)
     quiet = np.ones(len(count), dtype=bool)
     for angle in samples.attitude[:, :2].T:
-        mean = np.bincount(block, angle) / count
-        spread = np.sqrt(np.bincount(block, (angle - mean[block]) ** 2) / count)
+        spread = np.sqrt(np.bincount(block, from_block_mean(angle, block) ** 2) / count)
         quiet &= spread < STILL_WOBBLE_RAD
     return quiet
 

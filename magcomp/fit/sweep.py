@@ -28,6 +28,7 @@ from magcomp.model import (
     SOFT_IRON,
     Correction,
     FloatArray,
+    IntArray,
     Lags,
     Level,
     MotorFit,
@@ -68,12 +69,20 @@ def is_still(samples: Samples) -> bool:
 def _wobble(samples: Samples) -> float:
     """Median departure of roll and pitch from their mean over seconds, radians, the larger one."""
     block = time_blocks(samples.time, _WOBBLE_S)
-    count = np.bincount(block)
-    apart = [
-        np.median(np.abs(angle - (np.bincount(block, angle) / np.maximum(count, 1))[block]))
-        for angle in samples.attitude[:, :2].T
-    ]
-    return float(max(apart))
+    tilt = samples.attitude[:, :2].T
+    return float(max(np.median(np.abs(from_block_mean(angle, block))) for angle in tilt))
+
+
+def from_block_mean(values: FloatArray, block: IntArray) -> FloatArray:
+    """Each value less the mean of its block, shape (n,).
+
+    Examples
+    --------
+    >>> from_block_mean(np.array([1.0, 3.0, 7.0]), np.array([0, 0, 2])).tolist()
+    [-1.0, 1.0, 0.0]
+    """
+    mean = np.bincount(block, values) / np.maximum(np.bincount(block), 1)
+    return np.asarray(values - mean[block])
 
 
 def fit_sweep(problem: Problem, *, lag: float | None = None) -> MotorFit:
