@@ -57,7 +57,8 @@ def sample(
     down_rate = (
         gravity_direction(after[:, 0], after[:, 1]) - gravity_direction(before[:, 0], before[:, 1])
     ) / (2 * _RATE_STEP_S)
-    applied = commanded - readings.applied_later
+    later = lags.regressor + readings.applied_later if lags.applied is None else lags.applied
+    applied = readings.time - later
     raw, raw_rate = _undo(readings, in_force, applied)
     return Samples(
         compass=readings.compass,
@@ -112,7 +113,7 @@ def _undo(
             series = Series(series.time, stretch.multiplied(series.value))
             added = stretch.correction.added
             field = field - added(interpolate(series, applied[rows]))
-            # d/dlag of −MOT·u(t − lag) is +MOT·u̇.
+            # The derivative of −MOT·u(t − applied) by applied is +MOT·u̇.
             raw_rate[rows] = added(_rate(series, applied[rows])) @ inverse.T
         raw[rows] = field @ inverse.T - stretch.correction.offset
     return raw, raw_rate
