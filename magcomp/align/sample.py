@@ -56,7 +56,8 @@ def sample(
         gravity_direction(*interpolate(tilt, measured + step).T)
         for step in (-_RATE_STEP_S, _RATE_STEP_S)
     )
-    applied = commanded - readings.applied_later
+    later = lags.regressor + readings.applied_later if lags.applied is None else lags.applied
+    applied = readings.time - later
     raw, raw_rate = _undo(readings, in_force, applied)
     return Samples(
         compass=readings.compass,
@@ -111,7 +112,7 @@ def _undo(
             series = Series(series.time, stretch.multiplied(series.value))
             added = stretch.correction.added
             field = field - added(interpolate(series, applied[rows]))
-            # d/dlag of −MOT·u(t − lag) is +MOT·u̇.
+            # The derivative of −MOT·u(t − applied) by applied is +MOT·u̇.
             raw_rate[rows] = added(_rate(series, applied[rows])) @ inverse.T
         raw[rows] = field @ inverse.T - stretch.correction.offset
     return raw, raw_rate

@@ -24,13 +24,13 @@ from magcomp.model import (
     unpack,
 )
 
-STRENGTH, SIN_DIP, FIELD_LAG, REGRESSOR_LAG = range(CORRECTION_SIZE, CORRECTION_SIZE + 4)
-TILT, LEAN = (
-    slice(CORRECTION_SIZE + 4, CORRECTION_SIZE + 6),
-    slice(CORRECTION_SIZE + 6, CORRECTION_SIZE + 8),
+STRENGTH, SIN_DIP, FIELD_LAG, REGRESSOR_LAG, APPLIED_LAG = range(
+    CORRECTION_SIZE, CORRECTION_SIZE + 5
 )
-NUISANCE = slice(CORRECTION_SIZE + 4, CORRECTION_SIZE + 8)
-SIZE = CORRECTION_SIZE + 8
+LAGS = slice(FIELD_LAG, APPLIED_LAG + 1)
+TILT, LEAN = slice(LAGS.stop, LAGS.stop + 2), slice(LAGS.stop + 2, LAGS.stop + 4)
+NUISANCE = slice(TILT.start, LEAN.stop)
+SIZE = LEAN.stop
 """Parameters where the control quantity has one part; other parts' motor vectors follow."""
 
 DIAGONAL, OFF_DIAGONAL = slice(6, 9), slice(9, 12)
@@ -123,9 +123,8 @@ def _columns(samples: Samples, parameters: FloatArray) -> FloatArray:
     slopes[STRENGTH] = -_dot(pulled, earth[:, None]) / parameters[STRENGTH]
     slopes[SIN_DIP] = -_dot(pulled, by_dip[:, None])
     slopes[FIELD_LAG] = _dot(turned, _cross(down, _across(samples.down_rate))[:, None])
-    slopes[REGRESSOR_LAG] = _dot(axes, _across(samples.raw_rate)[:, None]) - _dot(
-        pulled, _across(correction.added(samples.u_rate))[:, None]
-    )
+    slopes[REGRESSOR_LAG] = -_dot(pulled, _across(correction.added(samples.u_rate))[:, None])
+    slopes[APPLIED_LAG] = _dot(axes, _across(samples.raw_rate)[:, None])
     slopes[TILT] = -turned[:2]
     slopes[LEAN] = slopes[TILT] * _leaning(samples)[:, None]
     columns[0] = _dot(axes, (inverse @ (corrected - earth))[:, None])
@@ -216,7 +215,8 @@ def parameters_of(fit: MotorFit, lags: Lags) -> FloatArray:
         [
             packed[:CORRECTION_SIZE],
             [fit.strength, fit.vertical / fit.strength, lags.field, lags.regressor],
-            np.zeros(SIZE - CORRECTION_SIZE - 4),
+            [lags.regressor if lags.applied is None else lags.applied],
+            np.zeros(SIZE - NUISANCE.start),
             packed[CORRECTION_SIZE:],
         ]
     )
@@ -228,8 +228,9 @@ def indices_of_correction(size: int) -> IntArray:
 
 
 def lags_of(parameters: FloatArray) -> Lags:
-    """The two lags among the parameters."""
-    return Lags(float(parameters[FIELD_LAG]), float(parameters[REGRESSOR_LAG]))
+    """The lags among the parameters."""
+    field, regressor, applied = parameters[LAGS].tolist()
+    return Lags(field, regressor, applied)
 
 
 def vertical_of(parameters: FloatArray) -> float:
