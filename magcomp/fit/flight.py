@@ -8,7 +8,7 @@ heading cannot leak in::
     r₁ = |c| − F                (docs/method.md, Equation 4)
     r₂ = c · down − F sin(dip)
 
-Both lags are parameters like the others. How much is free follows from what the
+The lags are parameters like the others. How much is free follows from what the
 data can tell: the motor vector alone, then offsets, then the diagonal, then the
 off-diagonal of the soft iron, each group with the calibration in force as prior.
 """
@@ -24,8 +24,10 @@ from magcomp.align import sample, within
 from magcomp.earth import EarthField
 from magcomp.fit.control_noise import Noise
 from magcomp.fit.field_model import (
+    APPLIED_LAG,
     DIAGONAL,
     FIELD_LAG,
+    LAGS,
     LEAN,
     OFF_DIAGONAL,
     REGRESSOR_LAG,
@@ -37,6 +39,7 @@ from magcomp.fit.field_model import (
     errors_of,
     indices_of_correction,
     lags_of,
+    rows_and_errors,
     rows_of,
     strength_and_dip,
 )
@@ -172,7 +175,8 @@ def prior(problem: Problem, free: int) -> Prior:
     mean[:CORRECTION_SIZE] = pack(present)[:CORRECTION_SIZE]
     mean[MOTOR] = 0.0
     mean[[STRENGTH, SIN_DIP]] = earth.strength, np.sin(earth.dip)
-    mean[[FIELD_LAG, REGRESSOR_LAG]] = LAG_MEAN_S
+    mean[LAGS] = LAG_MEAN_S
+    mean[APPLIED_LAG] += problem.readings.applied_later
     width = np.zeros(size)
     width[MOTOR] = width[SIZE:] = np.inf
     width[OFFSET] = OPEN_OFFSET_MGAUSS if free >= 2 else TRUSTED_OFFSET_MGAUSS
@@ -181,7 +185,7 @@ def prior(problem: Problem, free: int) -> Prior:
     # A free shape and a free strength are one number too many: scale is then the model's.
     width[STRENGTH] = (1e-4 if free >= 3 else SCALE_WIDTH) * earth.strength
     width[SIN_DIP] = DIP_WIDTH
-    width[[FIELD_LAG, REGRESSOR_LAG]] = LAG_WIDTH_S
+    width[LAGS] = LAG_WIDTH_S
     width[TILT], width[LEAN] = TILT_WIDTH_RAD, LEAN_WIDTH
     return Prior(mean, width)
 
@@ -218,7 +222,7 @@ def estimate(
     free
         1 … 4.
     start
-        Parameters to begin at, shape (16,); the prior's mean by default.
+        Parameters to begin at, shape (SIZE,); the prior's mean by default.
     hold_lags
         Keep the lags of ``start``.
     errors
@@ -232,7 +236,7 @@ def estimate(
     known = _with_lags_held(prior(problem, free)) if hold_lags else prior(problem, free)
     begin = known.mean if start is None else np.where(known.width > 0, start, known.mean)
     if hold_lags and start is not None:
-        begin[[FIELD_LAG, REGRESSOR_LAG]] = start[[FIELD_LAG, REGRESSOR_LAG]]
+        begin[LAGS] = start[LAGS]
     fixed = problem.sample(lags_of(begin)) if hold_lags else None
     search = with_covariance and errors is None
 
@@ -270,7 +274,7 @@ def near(problem: Problem, free: int, start: FloatArray) -> FloatArray:
         What all readings gave, shape (SIZE,); its lags are kept.
     """
     samples = problem.sample(lags_of(start))
-    values, slopes = strength_and_dip(samples, start, errors_of(samples, start))
+    (values, slopes, _), _ = rows_and_errors(samples, start)
     return one_step(values, slopes, start, _with_lags_held(prior(problem, free)))
 
 
@@ -326,7 +330,7 @@ def _believed(problem: Problem, offset: float, soft_iron: float, *, is_open: boo
 
 def _with_lags_held(known: Prior) -> Prior:
     width = known.width.copy()
-    width[[FIELD_LAG, REGRESSOR_LAG]] = 0.0
+    width[LAGS] = 0.0
     return Prior(known.mean, width)
 
 
@@ -337,7 +341,7 @@ def drift_blocks(time: FloatArray) -> IntArray:
 
 
 def estimate_lags(problem: Problem, correction: Correction) -> tuple[Lags, Lags]:
-    """Both lags and their standard errors for a correction that is known already.
+    """The lags and their standard errors for a correction that is known already.
 
     Parameters
     ----------
@@ -377,7 +381,7 @@ def is_physical(parameters: FloatArray) -> bool:
     A mirrored soft iron fits strength and dip as well and turns the heading by 180°.
     """
     values = np.linalg.eigvalsh(symmetric(parameters[SOFT_IRON]))
-    lags = np.abs(parameters[[FIELD_LAG, REGRESSOR_LAG]])
+    lags = np.abs(parameters[LAGS])
     return bool(values[0] > 0.3 and values[-1] < 3.0 and np.all(lags < LAG_MOST_S))
 
 
