@@ -183,9 +183,9 @@ class MagcompApp(BaseApp):
         """Ask for a log."""
         opening.ask_log(self)
 
-    def action_simulate(self) -> None:
+    def action_simulate(self, autopilot: str = "ardupilot") -> None:
         """Connect to a simulated vehicle."""
-        opening.simulate(self)
+        opening.simulate(self, autopilot)
 
     def action_disconnect(self) -> None:
         """Close vehicle or log."""
@@ -272,8 +272,11 @@ class MagcompApp(BaseApp):
 
     def get_system_commands(self, screen: Screen[Any]) -> Iterable[SystemCommand]:
         """Everything a key does, by name, and what needs no key."""
-        yield SystemCommand("Open a log", "A .tlog of a flight", self.action_open_log)
+        yield SystemCommand("Open a log", "A .tlog, .BIN or .ulg", self.action_open_log)
         yield SystemCommand("Simulated vehicle", "Try everything", self.action_simulate)
+        yield SystemCommand(
+            "Simulated PX4 vehicle", "Try everything", lambda: self.action_simulate("px4")
+        )
         yield SystemCommand("Disconnect", "Close vehicle or log", self.action_disconnect)
         for step, title in STEPS.items():
             yield SystemCommand(

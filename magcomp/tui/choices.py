@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 from magcomp.link import SerialPort
 
-SIMULATED = "simulated vehicle"
+SIMULATED = {"simulated vehicle": "ardupilot", "simulated PX4 vehicle": "px4"}
+"""What is chosen, and whose firmware it has."""
+
 LISTEN = "udp:0.0.0.0:14550"
 
 
@@ -18,7 +20,7 @@ class Choice:
     Attributes
     ----------
     target
-        Address or path, or `SIMULATED`.
+        Address or path, or one of `SIMULATED`.
     note
         What it is.
     """
@@ -35,5 +37,5 @@ def choices(ports: Iterable[SerialPort], recent: Sequence[str]) -> tuple[Choice,
         *listed,
         *(Choice(name, "used lately") for name in recent if name not in known),
         Choice(LISTEN, "listen for whoever sends here"),
-        Choice(SIMULATED, "to try everything; nothing can break"),
+        *(Choice(name, "to try everything; nothing can break") for name in SIMULATED),
     )
