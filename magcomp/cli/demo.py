@@ -30,9 +30,6 @@ from magcomp.writing.files import write_parameter_file
 from magcomp.writing.writer import raise_for_failure
 
 _CURRENTS = (0.0, 10.0, 20.0, 30.0, 40.0, 50.0)
-_TRUTH = {"ardupilot": "SIMSTATE", "px4": "HIL_STATE_QUATERNION"}
-"""What a simulation says of itself, for the comparison at the end."""
-
 _TRUTH_HZ = 20.0
 _LOOK_S = 0.1
 _PATIENCE_S = 30.0
@@ -74,8 +71,8 @@ class _Bench:
 )
 @click.option(
     "--autopilot",
-    type=click.Choice(list(_TRUTH)),
-    default=next(iter(_TRUTH)),
+    type=click.Choice([each.key for each in autopilots.ALL]),
+    default=autopilots.ALL[0].key,
     show_default=True,
     help="Whose firmware it has.",
 )
@@ -185,7 +182,7 @@ def _fly(session: LiveSession, bench: _Bench, status: StatusLine) -> None:
 
 
 def _session(bench: _Bench, address: str, record: str) -> LiveSession:
-    rates = {**DEFAULT_RATES, _TRUTH[bench.autopilot]: _TRUTH_HZ}
+    rates = {**DEFAULT_RATES, autopilots.named(bench.autopilot).truth_message: _TRUTH_HZ}
     return LiveSession.open(
         address, record=bench.path(record), system=1, rates=rates, refit_share=0.0
     )

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from magcomp import autopilots
 from magcomp.link import SerialPort
 
-SIMULATED = {"simulated vehicle": "ardupilot", "simulated PX4 vehicle": "px4"}
+SIMULATED = {f"simulated {each.title} vehicle": each.key for each in autopilots.ALL}
 """What is chosen, and whose firmware it has."""
 
 LISTEN = "udp:0.0.0.0:14550"

@@ -141,7 +141,7 @@ def simulate(autopilot: str) -> Simulation:
     Parameters
     ----------
     autopilot
-        Whose firmware it has: ``"ardupilot"`` or ``"px4"``.
+        Whose firmware it has, as in ``Vehicle.autopilot``.
 
     Raises
     ------

@@ -33,7 +33,7 @@ class TargetList(OptionList):
 - *udp:0.0.0.0:14550* listens for a vehicle, simulator or ground station that sends to this
   computer; *tcp:HOST:PORT* connects to one.
 - A *log* is a .tlog, .BIN or .ulg file: everything but writing works without a vehicle.
-- A *simulated vehicle*, ArduPilot's or PX4's, needs nothing and can break nothing.
+- A *simulated vehicle* needs nothing and can break nothing.
 """
 
 
