@@ -28,15 +28,16 @@ STRENGTH, SIN_DIP, FIELD_LAG, REGRESSOR_LAG, APPLIED_LAG = range(
     CORRECTION_SIZE, CORRECTION_SIZE + 5
 )
 LAGS = slice(FIELD_LAG, APPLIED_LAG + 1)
-TILT, LEAN = slice(LAGS.stop, LAGS.stop + 2), slice(LAGS.stop + 2, LAGS.stop + 4)
+LEANS_S = (2.0, 8.0)
+"""How soon a lean that is held shows in the attitude: between these, for most filters."""
+
+TILT = slice(LAGS.stop, LAGS.stop + 2)
+LEAN = slice(TILT.stop, TILT.stop + 2 * len(LEANS_S))
 NUISANCE = slice(TILT.start, LEAN.stop)
 SIZE = LEAN.stop
 """Parameters where the control quantity has one part; other parts' motor vectors follow."""
 
 DIAGONAL, OFF_DIAGONAL = slice(6, 9), slice(9, 12)
-
-LEAN_S = 4.0
-"""How soon a lean that is held shows in the attitude."""
 
 
 def strength_and_dip(
@@ -96,7 +97,7 @@ def _rows(samples: Samples, parameters: FloatArray) -> tuple[FloatArray, FloatAr
         # A turn w of the body moves the field in body axes by w × b, which b × pulled weighs.
         turned = _cross(earth, pulled[kind])
         slopes[:, kind, TILT] = -turned[:, :2]
-        slopes[:, kind, LEAN] = -turned[:, :2] * leaning
+        slopes[:, kind, LEAN] = np.concatenate([-turned[:, :2] * each for each in leaning], axis=1)
         slopes[:, kind, FIELD_LAG] = np.einsum("ij,ij->i", turned, _cross(down, samples.down_rate))
     values = np.stack([np.einsum("ij,ij->i", axis, apart) for axis in axes], axis=1)
     values += slopes[:, :, NUISANCE] @ parameters[NUISANCE]
@@ -138,18 +139,18 @@ def _cross(one: FloatArray, other: FloatArray) -> FloatArray:
     return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
 
 
-def _leaning(samples: Samples) -> FloatArray:
-    """Roll and pitch, slowly followed: what acceleration does to an attitude filter, (n, 2).
+def _leaning(samples: Samples) -> list[FloatArray]:
+    """Roll and pitch, followed by each of LEANS_S: what acceleration does to attitude, (n, 2) each.
 
     A multirotor accelerates where it leans, and its attitude filter takes the acceleration for
-    gravity within a few seconds.
+    gravity within seconds. A sum of a fast and a slow one comes near any in between, and near one
+    that lets go again, as the vehicle does when its drag has caught up with its lean.
     """
     if len(samples) < 2:
-        return np.zeros((len(samples), 2))
+        return [np.zeros((len(samples), 2)) for _ in LEANS_S]
     step = max(float(np.median(np.diff(samples.time))), 1e-3)
-    share = step / (LEAN_S + step)
     tilt = samples.attitude[:, :2] - np.median(samples.attitude[:, :2], axis=0)
-    return low_pass(tilt, share)
+    return [low_pass(tilt, step / (each + step)) for each in LEANS_S]
 
 
 def errors_of(samples: Samples, parameters: FloatArray) -> Noise | None:
