@@ -67,9 +67,13 @@ def gravity_direction(roll: ArrayLike, pitch: ArrayLike) -> FloatArray:
     >>> gravity_direction(0.0, np.radians(30.0)).round(3).tolist()
     [-0.5, 0.0, 0.866]
     """
-    roll, pitch = np.broadcast_arrays(np.asarray(roll, float), np.asarray(pitch, float))
+    roll, pitch = np.asarray(roll, float), np.asarray(pitch, float)
     cos_pitch = np.cos(pitch)
-    return np.stack([-np.sin(pitch), np.sin(roll) * cos_pitch, np.cos(roll) * cos_pitch], axis=-1)
+    y, z = np.sin(roll) * cos_pitch, np.cos(roll) * cos_pitch
+    down = np.empty((3, *np.shape(y)))
+    np.negative(np.sin(pitch), out=down[0, ...])
+    down[1], down[2] = y, z
+    return np.moveaxis(down, 0, -1)
 
 
 def body_from_earth(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> FloatArray:

@@ -39,6 +39,7 @@ from magcomp.fit.field_model import (
     errors_of,
     indices_of_correction,
     lags_of,
+    rows_and_errors,
     rows_of,
     strength_and_dip,
 )
@@ -273,7 +274,7 @@ def near(problem: Problem, free: int, start: FloatArray) -> FloatArray:
         What all readings gave, shape (SIZE,); its lags are kept.
     """
     samples = problem.sample(lags_of(start))
-    values, slopes = strength_and_dip(samples, start, errors_of(samples, start))
+    (values, slopes, _), _ = rows_and_errors(samples, start)
     return one_step(values, slopes, start, _with_lags_held(prior(problem, free)))
 
 

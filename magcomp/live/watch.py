@@ -30,12 +30,12 @@ from magcomp.live.guide import (
 )
 from magcomp.live.latest import Now
 from magcomp.live.prepare import Preparation
-from magcomp.live.progress import Enough, HeadingRing, HoverBound
+from magcomp.live.progress import Enough, HeadingRing, HoverBound, largest_bound
 from magcomp.live.refit import Refit
 from magcomp.live.situation import Look, Manoeuvre, SituationWatch
 from magcomp.live.snapshot import LiveSnapshot, compasses_now, slow_streams, warnings
 from magcomp.live.tap import Tap
-from magcomp.model import CURRENT, THROTTLE, Analysis, Grade, Vehicle
+from magcomp.model import CURRENT, THROTTLE, Vehicle
 
 LOOK_S = 0.2
 _GAP_TOLD_S = 20.0
@@ -107,7 +107,7 @@ class Watch:
         self._situation.update(Look(seconds, now.armed, now.attitude, now.height_m, now.accel))
         self._ring.look(now.armed, now.attitude, now.throttle)
         loads = {CURRENT: now.current, THROTTLE: now.throttle}
-        self._hover.look(now.armed, loads, self._refit().analysis)
+        self._hover.look(now.armed, loads, self._refit().analysis, seconds)
 
     @property
     def elapsed_s(self) -> float:
@@ -190,7 +190,7 @@ class Watch:
             seconds=self._tap.seconds(vehicle),
             grade=None if refit.analysis is None else refit.analysis.grade,
             stable_refits=refit.stable,
-            bound_deg=_bound_deg(refit.analysis),
+            bound_deg=largest_bound(refit.analysis),
             was_enough=self._enough.reached(self._situation.situation),
         )
 
@@ -232,17 +232,6 @@ class Watch:
         if self._tap.failure:
             found.insert(0, self._tap.failure.rstrip("."))
         return tuple(found)
-
-
-def _bound_deg(analysis: Analysis | None) -> float:
-    """Largest heading error, 95 %, of the compasses that are not rejected."""
-    errors = [
-        error.p95
-        for result in (analysis.compasses if analysis else ())
-        if result.verdict.grade is not Grade.REJECTED
-        for error in result.verdict.heading_error
-    ]
-    return max(errors, default=math.inf)
 
 
 def _wanted_deg(view: View) -> float | None:

@@ -235,7 +235,7 @@ def _on_earth(value: FloatArray) -> BoolArray:
 
 def _series(time: FloatArray, value: FloatArray, rows: BoolArray | None = None) -> Series | None:
     """Rows that are finite, in order of time; None where there is none."""
-    sound = np.isfinite(value).reshape(len(value), -1).all(axis=1)
+    sound = np.isfinite(value).all(axis=tuple(range(1, value.ndim)))
     if rows is not None:
         sound &= rows
     if not sound.any():
