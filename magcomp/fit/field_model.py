@@ -28,15 +28,16 @@ STRENGTH, SIN_DIP, FIELD_LAG, REGRESSOR_LAG, APPLIED_LAG = range(
     CORRECTION_SIZE, CORRECTION_SIZE + 5
 )
 LAGS = slice(FIELD_LAG, APPLIED_LAG + 1)
-TILT, LEAN = slice(LAGS.stop, LAGS.stop + 2), slice(LAGS.stop + 2, LAGS.stop + 4)
+LEANS_S = (2.0, 8.0)
+"""How soon a lean that is held shows in the attitude: between these, for most filters."""
+
+TILT = slice(LAGS.stop, LAGS.stop + 2)
+LEAN = slice(TILT.stop, TILT.stop + 2 * len(LEANS_S))
 NUISANCE = slice(TILT.start, LEAN.stop)
 SIZE = LEAN.stop
 """Parameters where the control quantity has one part; other parts' motor vectors follow."""
 
 DIAGONAL, OFF_DIAGONAL = slice(6, 9), slice(9, 12)
-
-LEAN_S = 4.0
-"""How soon a lean that is held shows in the attitude."""
 
 
 def strength_and_dip(
@@ -126,7 +127,8 @@ def _columns(samples: Samples, parameters: FloatArray) -> FloatArray:
     slopes[REGRESSOR_LAG] = -_dot(pulled, _across(correction.added(samples.u_rate))[:, None])
     slopes[APPLIED_LAG] = _dot(axes, _across(samples.raw_rate)[:, None])
     slopes[TILT] = -turned[:2]
-    slopes[LEAN] = slopes[TILT] * _leaning(samples)[:, None]
+    for start, leaning in zip(range(LEAN.start, LEAN.stop, 2), _leaning(samples), strict=True):
+        slopes[start : start + 2] = slopes[TILT] * leaning[:, None]
     columns[0] = _dot(axes, (inverse @ (corrected - earth))[:, None])
     columns[0] += np.tensordot(parameters[NUISANCE], slopes[NUISANCE], axes=1)
     columns[1] = np.tensordot(correction.vector, pulled, axes=1)
@@ -183,18 +185,18 @@ def _cross(one: FloatArray, other: FloatArray) -> FloatArray:
     )
 
 
-def _leaning(samples: Samples) -> FloatArray:
-    """Roll and pitch, slowly followed: what acceleration does to an attitude filter, (2, n).
+def _leaning(samples: Samples) -> list[FloatArray]:
+    """Roll and pitch, followed by each of LEANS_S: what acceleration does to attitude, (2, n) each.
 
     A multirotor accelerates where it leans, and its attitude filter takes the acceleration for
-    gravity within a few seconds.
+    gravity within seconds. A sum of a fast and a slow one comes near any in between, and near one
+    that lets go again, as the vehicle does when its drag has caught up with its lean.
     """
     if len(samples) < 2:
-        return np.zeros((2, len(samples)))
+        return [np.zeros((2, len(samples))) for _ in LEANS_S]
     step = max(float(np.median(np.diff(samples.time))), 1e-3)
-    share = step / (LEAN_S + step)
     tilt = samples.attitude[:, :2] - np.median(samples.attitude[:, :2], axis=0)
-    return np.asarray(low_pass(tilt, share).T)
+    return [low_pass(tilt, step / (each + step)).T for each in LEANS_S]
 
 
 def correction_at(parameters: FloatArray) -> Correction:

@@ -101,7 +101,7 @@ def test_a_poor_flight_leans_on_the_calibration_in_force(seed):
 
 @pytest.mark.parametrize("compensated", [False, True], ids=["off", "current in force"])
 def test_the_stated_derivatives_are_those_of_the_residuals(compensated):
-    """All 21: motor, offset, soft iron, strength, dip, the three lags, tilt and lean."""
+    """All 23: motor, offset, soft iron, strength, dip, the three lags, tilt and lean."""
     in_force = None
     if compensated:
         wrong = replace(EXACT, motor=np.array([3.0, 2.0, -1.0]))
@@ -122,7 +122,7 @@ def test_the_stated_derivatives_are_those_of_the_residuals(compensated):
             np.full(3, 1e-2),
             np.full(6, 1e-5),
             [1e-2, 1e-5, 0.04, 0.04, 0.04],
-            np.full(4, 1e-3),
+            np.full(6, 1e-3),
         ]
     )
     inside = slice(10, -10)
