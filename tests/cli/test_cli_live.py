@@ -233,7 +233,7 @@ def test_calibrate_guides_ends_when_the_pilot_disarms_fits_and_writes(
     tmp_path, data_directory, capsys
 ):
     answer, log = tmp_path / "a.param", tmp_path / "a.tlog"
-    with alive("sweep", speed=16.0) as flown:
+    with alive("sweep", speed=30.0) as flown:
         options = ("-o", answer, "--record", log, "--system", 1, "--upload", "--yes")
         assert magcomp("calibrate", flown.address, *options) == ExitCode.GOOD
         found = read_parameter_file(answer).values

@@ -15,7 +15,7 @@ from magcomp.tui.services import Services
 
 async def until(pilot, true) -> None:
     """Pilot's own way waits for an idle process, and the simulated vehicle never is."""
-    await scripted.until(pilot, true, idle=False)
+    await scripted.until(pilot, true, idle=False, look_s=0.05)
 
 
 async def tap(pilot, key: str) -> None:
@@ -27,7 +27,7 @@ async def tap(pilot, key: str) -> None:
 
 async def test_the_whole_road(tmp_path):
     usual = Services()
-    with live_vehicle.alive("sweep", seed=4, speed=16.0) as flown:
+    with live_vehicle.alive("sweep", seed=4, speed=30.0) as flown:
         before = dict(flown.vehicle.parameters)
         app = scripted.app(tmp_path, flown.address, open_live=usual.open_live)
         async with app.run_test(size=(120, 40)) as pilot:
