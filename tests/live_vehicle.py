@@ -13,7 +13,16 @@ from magcomp.simulate import Faults, FaultyLink, Machine, Vehicle, run, scenario
 from magcomp.simulate.transports import open_transport
 
 PATIENCE_S = 300.0
-AFTERWARDS = 2.0
+RATES = {
+    **dict.fromkeys(("RAW_IMU", "SCALED_IMU2", "SCALED_IMU3", "BATTERY_STATUS"), 10.0),
+    "ATTITUDE": 20.0,
+    "VFR_HUD": 5.0,
+    "SYS_STATUS": 2.0,
+    "GLOBAL_POSITION_INT": 2.0,
+}
+"""A third of the usual: enough for a fit, and less to simulate."""
+
+AFTERWARDS = 1.0
 """Speed of a vehicle that has landed: what it says in vain would only cost time."""
 
 
