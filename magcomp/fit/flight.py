@@ -52,7 +52,7 @@ from magcomp.fit.robust import (
     solve,
     time_blocks,
 )
-from magcomp.fit.wander import Posterior, Rows, mixed, posterior
+from magcomp.fit.wander import Posterior, Reduced, Rows, likeliest, mixed, posterior, weighed
 from magcomp.model import (
     CORRECTION_SIZE,
     MOTOR,
@@ -292,31 +292,34 @@ def with_wander(problem: Problem, found: FlightEstimate, free: int) -> tuple[Fli
         The groups that were open in it; they stand where no marginal solution is possible.
     """
 
-    def rows(parameters: FloatArray) -> Rows:
+    def part_at(parameters: FloatArray) -> Reduced:
         samples = problem.sample(lags_of(parameters))
         values, slopes, pulls = rows_of(samples, parameters, found.errors)
-        return Rows(samples.time, values, slopes, pulls * float(np.std(samples.total)))
+        return weighed(Rows(samples.time, values, slopes, pulls * float(np.std(samples.total))))
 
     calibrated = is_calibrated(problem.readings.in_force[-1].correction)
+    beliefs = [
+        (groups, _believed(problem, offset, soft_iron, is_open=groups == len(GROUPS)), share)
+        for groups, offset, soft_iron, share in (_BELIEFS if calibrated else _BELIEFS[:1])
+    ]
+    first = part_at(found.parameters)
+    wander = likeliest(first, beliefs[0][1], found.parameters)
+    if not wander.shows:
+        # Least squares is less sensitive to a current that is wrong for seconds.
+        return found, free
     each: dict[int, Posterior] = {}
-    wander = None
-    for groups, offset, soft_iron, share in _BELIEFS if calibrated else _BELIEFS[:1]:
-        known = _believed(problem, offset, soft_iron, is_open=groups == len(GROUPS))
-        one = posterior(rows, found.parameters, known, is_physical, wander)
-        if one is not None and not one.wander.shows:
-            # Least squares is less sensitive to a current that is wrong for seconds.
-            return found, free
+    for groups, known, share in beliefs:
+        one = posterior(part_at, found.parameters, known, is_physical, wander, first)
         if one is not None:
             each[groups] = replace(one, evidence=one.evidence + float(np.log(share)))
-            wander = one.wander
     if not each:
         return found, free
     answer = mixed(each.values())
-    likeliest = max(each, key=lambda groups: each[groups].evidence)
+    likely = max(each, key=lambda groups: each[groups].evidence)
     if not is_physical(answer.parameters):
-        answer = each[likeliest]
+        answer = each[likely]
     covariance = _SIZES_UNKNOWN**2 * answer.covariance
-    moved = 1 if likeliest == 1 else len(GROUPS)
+    moved = 1 if likely == 1 else len(GROUPS)
     return replace(found, parameters=answer.parameters, covariance=covariance), moved
 
 

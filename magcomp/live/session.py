@@ -37,6 +37,7 @@ from magcomp.live.watch import LOOK_S, Watch
 from magcomp.model import Analysis, ParameterSet, Recording, Vehicle
 from magcomp.writing.events import Event, Outcome
 from magcomp.writing.files import is_own
+from magcomp.writing.in_force import in_force_sentence
 from magcomp.writing.plan import WritePlan
 
 _Result = TypeVar("_Result")
@@ -337,6 +338,13 @@ class LiveSession:
                 unix_us=self._clock.unix_us,
                 on_event=on_event,
                 stop=stop,
+            )
+
+    def what_acts(self, plan: WritePlan) -> str:
+        """Look whether what was written is in force; see ``in_force_sentence``."""
+        with self._asked:
+            return in_force_sentence(
+                self.connection, plan, self._clock.monotonic, self.connection.requested_rates
             )
 
     def restore(

@@ -12,6 +12,7 @@ from textual.widget import Widget
 from textual.widgets import Static
 
 from magcomp.live.situation import Situation
+from magcomp.report import words
 from magcomp.tui.before_after import HeadingPair, HeadingWatch, heading_pairs
 from magcomp.tui.screens.step import StepScreen
 from magcomp.tui.state import State
@@ -125,6 +126,8 @@ def state_lines(state: State) -> tuple[str, ...]:
         return tuple(promise.sentence for promise in writing.measured)
     if writing.measured_trouble:
         return (writing.measured_trouble,)
+    if writing.acts:
+        return (words.sentence(writing.acts), "“Before” is worked out from the backup.")
     if writing.in_force:
         return ("The new parameters are in force; “before” is worked out from the backup.",)
     if state.work.analysis is not None:
