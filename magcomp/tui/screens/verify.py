@@ -92,7 +92,7 @@ class VerifyScreen(StepScreen):
         if live is not None and live.armed and live.situation is Situation.FLYING:
             return "Hold a heading, climb and descend: “takes out” grows with the throttle."
         if writing.measured:
-            return "Done: Q ends and says where your files are. Or fly again to measure again."
+            return "Done: Q ends and says where your files are. Fly on to measure again."
         if writing.in_force and not self._watch.marked:
             return "Fly as before and land: it is then measured. On the ground: M, see F1."
         if not self._watch.marked:
