@@ -6,7 +6,6 @@ import itertools
 from collections.abc import Iterator
 
 import pytest
-from distributed import LocalCluster
 from fleet_toys import die_of_three, double, fail_of_three
 
 from magcomp.errors import LinkError
@@ -20,6 +19,8 @@ def lost(task: int, why: str) -> tuple[int, str]:
 @pytest.fixture(scope="module")
 def scheduler() -> Iterator[str]:
     """One worker in this process."""
+    from distributed import LocalCluster  # noqa: PLC0415 - no other test needs so much of it
+
     with LocalCluster(
         processes=False, n_workers=1, threads_per_worker=1, dashboard_address=":0", protocol="tcp"
     ) as cluster:
