@@ -67,9 +67,13 @@ def gravity_direction(roll: ArrayLike, pitch: ArrayLike) -> FloatArray:
     >>> gravity_direction(0.0, np.radians(30.0)).round(3).tolist()
     [-0.5, 0.0, 0.866]
     """
-    roll, pitch = np.broadcast_arrays(np.asarray(roll, float), np.asarray(pitch, float))
+    roll, pitch = np.asarray(roll, float), np.asarray(pitch, float)
     cos_pitch = np.cos(pitch)
-    return np.stack([-np.sin(pitch), np.sin(roll) * cos_pitch, np.cos(roll) * cos_pitch], axis=-1)
+    y, z = np.sin(roll) * cos_pitch, np.cos(roll) * cos_pitch
+    down = np.empty((3, *np.shape(y)))
+    np.negative(np.sin(pitch), out=down[0, ...])
+    down[1], down[2] = y, z
+    return np.moveaxis(down, 0, -1)
 
 
 def body_from_earth(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> FloatArray:
@@ -98,6 +102,34 @@ def body_from_earth(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> FloatA
         axis=-2,
     )
     return np.asarray(np.swapaxes(level_matrix(roll, pitch), -1, -2) @ level_from_earth)
+
+
+def angles_of(quaternion: ArrayLike) -> FloatArray:
+    """Roll, pitch and yaw of unit quaternions.
+
+    Parameters
+    ----------
+    quaternion
+        From the earth's axes into the body's, w first, shape (n, 4).
+
+    Returns
+    -------
+    FloatArray
+        Radians, shape (n, 3).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from magcomp.geometry import angles_of
+    >>> half = np.radians(30.0) / 2.0
+    >>> np.degrees(angles_of([[np.cos(half), 0.0, 0.0, np.sin(half)]])).round(6).tolist()
+    [[0.0, 0.0, 30.0]]
+    """
+    w, x, y, z = np.asarray(quaternion, dtype=np.float64).T
+    roll = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
+    pitch = np.arcsin(np.clip(2 * (w * y - z * x), -1.0, 1.0))
+    yaw = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+    return np.stack([roll, pitch, yaw], axis=1)
 
 
 def heading(

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import sys
+import tempfile
 
+import pytest
 from effort import examples
 from hypothesis import settings
 
@@ -25,3 +27,19 @@ collect_ignore = (
     if sys.platform == "win32"
     else []
 )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Make the folder of `once.py`; the processes that share the tests inherit its name."""
+    if not hasattr(config, "workerinput"):
+        folder = tempfile.TemporaryDirectory(prefix="magcomp-tests-")
+        config.add_cleanup(folder.cleanup)
+        os.environ["MAGCOMP_TESTS_ONCE"] = folder.name
+
+
+@pytest.fixture
+def fits_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let commands that run in this process share their fits with other tests."""
+    import once  # noqa: PLC0415 - loads numpy, for which it is too early above
+
+    monkeypatch.setattr("magcomp.cli.work.analyse", once.analyse)

@@ -1,12 +1,13 @@
-"""The recordings of real firmware, each read and analysed once in a process."""
+"""The recordings of real firmware, each read once in a process and analysed once in a run."""
 
 from __future__ import annotations
 
 from functools import cache
 
+import once
 import truth
 
-from magcomp.analysis import analyse
+from magcomp.analysis import Options
 from magcomp.model import Analysis, CompassResult, Recording
 from magcomp.sources import read
 
@@ -18,9 +19,9 @@ def recording(name: str) -> Recording:
 
 
 @cache
-def analysis(name: str) -> Analysis:
-    """What magcomp makes of it, asked for nothing in particular."""
-    return analyse(recording(name))
+def analysis(name: str, options: Options | None = None) -> Analysis:
+    """What magcomp makes of it, asked for nothing in particular or for what the options say."""
+    return once.analyse(recording(name), options)
 
 
 def result(name: str, compass: int) -> CompassResult:

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from truth import FIXTURES
+import recordings
 
-from magcomp.analysis import Options, analyse
+from magcomp.analysis import Options
 from magcomp.model import Analysis, Recording
 from magcomp.report import as_json
-from magcomp.sources import read
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,8 +35,7 @@ class Case:
 @cache
 def case(name: str, options: Options | None = None) -> Case:
     wanted = Options() if options is None else options
-    recording = read(FIXTURES / f"{name}.tlog")
-    return Case(recording, analyse(recording, wanted), wanted)
+    return Case(recordings.recording(name), recordings.analysis(name, wanted), wanted)
 
 
 def still() -> Case:

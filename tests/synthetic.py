@@ -107,6 +107,8 @@ class Flown:
         Parameters that took another value at a time.
     field_lag, current_lag
         Delays, seconds (magcomp.model.Lags).
+    applied_later
+        What is in force is multiplied by the current of so much earlier, seconds.
     """
 
     seed: int = 1
@@ -116,6 +118,7 @@ class Flown:
     changed: tuple[ParameterChange, ...] = ()
     field_lag: float = 0.07
     current_lag: float = 0.05
+    applied_later: float = APPLIED_LATER_S
     noise: float = 1.0
     truncated: bool = False
     tilt: float = 0.15
@@ -162,7 +165,7 @@ class Flown:
 
     def corrected(self, time: FloatArray, raw: FloatArray, compass: int) -> FloatArray:
         """What the autopilot makes of a sensor field, mGauss, shape (n, 3)."""
-        now = self.current_at(time - self.current_lag - APPLIED_LATER_S)
+        now = self.current_at(time - self.current_lag - self.applied_later)
         corrected = np.empty_like(raw)
         edges = [-np.inf, *sorted({change.time for change in self.changed}), np.inf]
         for begin, end in pairwise(edges):

@@ -1,12 +1,11 @@
 """Fuzz one of magcomp's readers, its link or the whole analysis.
 
     python benchmarks/fuzz/run.py TARGET [--seconds S] [--seed N] [--keep FOLDER]
-    python benchmarks/fuzz/run.py TARGET --atheris [LIBFUZZER OPTIONS]
 
 An input must end in nothing or in one of magcomp's own errors, within 5 s and 1 GB, and without a
 warning of numpy. What does not is kept under its digest; put into corpus/TARGET it becomes a seed
-and a test (tests/test_fuzz_corpus.py). With --atheris (pip install atheris) coverage guides the
-mutations; without it the same mutations are made blindly.
+and a test (tests/test_fuzz_corpus.py). The mutations are made blindly; guided.py has them guided by
+coverage.
 """
 
 from __future__ import annotations
@@ -59,11 +58,16 @@ def fault_of(target: Target, data: bytes) -> str:
     return ""
 
 
+def _most_bytes() -> int:
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss << 10
+
+
 def blindly(name: str, seconds: float, seed: int, keep: Path) -> int:
-    """Mutate and try until the time is over; how many different faults there were."""
+    """Mutate and try for so much CPU time; how many different faults there were."""
     chance, target, begin = random.Random(seed), TARGETS[name], seeds(name)
-    end, count, faults = time.monotonic() + seconds, 0, set()
-    while time.monotonic() < end:
+    start, spent = _most_bytes(), time.process_time()
+    end, count, faults = spent + seconds, 0, set()
+    while time.process_time() < end:
         framed = name in FRAMED and chance.random() < 0.7
         data = (of_frames if framed else of_bytes)(chance, begin)
         fault = fault_of(target, data)
@@ -75,25 +79,13 @@ def blindly(name: str, seconds: float, seed: int, keep: Path) -> int:
             path = keep / f"{name}-{hashlib.sha256(data).hexdigest()[:12]}"
             path.write_bytes(data)
             print(f"{path}: {fault}", flush=True)
-    used = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss << 10
-    print(f"{name}: {count} executions, {len(faults)} faults, {used >> 20} MiB at most")
+    used = _most_bytes()
+    print(
+        f"{name}: {count} executions in {time.process_time() - spent:.0f} s of CPU, "
+        f"{len(faults)} faults, {used >> 20} MiB at most, {start >> 20} MiB at the start",
+        flush=True,
+    )
     return len(faults) + (used > MOST_BYTES)
-
-
-def guided(name: str, options: list[str]) -> None:
-    """Let atheris find its way by coverage; never returns."""
-    import atheris  # noqa: PLC0415 -- not installed with the development tools
-
-    atheris.instrument_all()
-    target = TARGETS[name]
-
-    def one(data: bytes) -> None:
-        fault = fault_of(target, data)
-        if fault:
-            raise AssertionError(fault)
-
-    atheris.Setup([sys.argv[0], *options], one)
-    atheris.Fuzz()
 
 
 def main() -> int:
@@ -103,11 +95,8 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--keep", type=Path, default=Path("fuzz-found"))
-    parser.add_argument("--atheris", action="store_true")
-    arguments, options = parser.parse_known_args()
+    arguments = parser.parse_args()
     warnings.simplefilter("error")
-    if arguments.atheris:
-        guided(arguments.target, options)
     return 1 if blindly(arguments.target, arguments.seconds, arguments.seed, arguments.keep) else 0
 
 

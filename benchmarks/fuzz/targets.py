@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import os
+import shutil
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from magcomp.analysis import Options, analyse
 from magcomp.analysis.analyse import check
+from magcomp.buffer import Buffer
 from magcomp.errors import MagcompError
-from magcomp.link.framing import Framer
+from magcomp.link.diagnosis import why_ambiguous, why_no_vehicle
+from magcomp.link.state import LinkState
+from magcomp.link.streams import DEFAULT_RATES
+from magcomp.link.transport import Peer
+from magcomp.live.latest import Latest
+from magcomp.live.tap import Tap
 from magcomp.mavlink.records import records
 from magcomp.report import as_json
 from magcomp.report.as_html import html
@@ -21,9 +29,10 @@ from magcomp.writing.journal import read_journal
 
 Target = Callable[[bytes], None]
 
-_FOLDER = Path(
-    tempfile.mkdtemp(prefix="fuzz", dir="/dev/shm" if Path("/dev/shm").is_dir() else None)
-)
+if Path("/dev/shm").is_dir():
+    tempfile.tempdir = "/dev/shm"  # a disk would cost more than what is tried
+_FOLDER = Path(tempfile.mkdtemp(prefix="fuzz"))
+atexit.register(shutil.rmtree, _FOLDER, ignore_errors=True)
 
 
 def _written(data: bytes, name: str) -> Path:
@@ -51,12 +60,53 @@ def journal(data: bytes) -> None:
     read_journal(_written(data, "x.journal"))
 
 
+_STEPS_S = (0.001, 0.05, 0.4, 7.0)
+_PIECES = (29, 97, 280, 1000, 4000)
+_PEERS: Sequence[Peer] = (None, ("127.0.0.1", 1), ("127.0.0.1", 2))
+_KEY = bytes(range(32))
+
+
 def link(data: bytes) -> None:
-    """Hear what comes in, in pieces."""
-    framer = Framer()
+    """A whole link hears what comes in, in pieces, from several peers, and loses its line.
+
+    The last eight bytes say how: who is wanted, with which key, in which pieces and when.
+    """
+    who, key, streams, size, step, peers, loss, _ = data[-8:].ljust(8, b"\0")
+    state = LinkState(
+        system=(None, None, 1, 2)[who % 4],
+        component=(None, None, None, 1, 191)[who % 5],
+        key=_KEY if key % 8 == 7 else None,
+    )
+    tap = Tap(Buffer("fuzz", limit=20_000), Latest(), None)
     stream = b"".join(frame for _, frame in records(data)) or data
-    for start in range(0, len(stream), 97):
-        framer.receive(stream[start : start + 97], start / 1e4)
+    now, cut = 0.0, _PIECES[size % len(_PIECES)]
+    for turn, start in enumerate(range(0, len(stream), cut)):
+        peer = _PEERS[turn % (1 + peers % len(_PEERS))]
+        for received in state.receive(stream[start : start + cut], now, peer):
+            if not received.from_stranger:
+                tap.add(int(now * 1e6), received.frame.raw)
+        for message in state.due(now):
+            state.pack(message, int(now * 1e6))
+        if turn % 16 == streams % 32:
+            state.request_streams(DEFAULT_RATES, now)
+        if turn % 16 == loss % 32:
+            state.closed(now, "lost")
+            state.reopened(now)
+        now += _STEPS_S[step % len(_STEPS_S)]
+    _tell(state, tap, now)
+
+
+def _tell(state: LinkState, tap: Tap, now: float) -> None:
+    """Ask a link all that a person may see of it."""
+    state.take_events()
+    known = state.statistics(now)
+    about = state.heartbeats, state.companions, state.foreign
+    why_no_vehicle("fuzz", 1.0, known, *about)
+    why_ambiguous("fuzz", state.heartbeats or state.companions, twins=False)
+    if (vehicle := state.vehicle) is not None:
+        tap.latest.now(vehicle)
+        tap.latest.parameters(vehicle)
+        tap.seconds(vehicle)
 
 
 def analysis(data: bytes) -> None:
@@ -84,5 +134,5 @@ TARGETS: Mapping[str, Target] = {
 }
 """By name; all but ``link`` may refuse what they are given by a MagcompError."""
 
-FRAMED = frozenset({"telemetry", "analysis"})
-"""Targets that take telemetry: half of their inputs are sound frames of hostile values."""
+FRAMED = frozenset({"telemetry", "link", "analysis"})
+"""Targets that take telemetry: most of their inputs are sound frames of hostile values."""

@@ -51,13 +51,13 @@ def sample(
     measured = readings.time - lags.field
     commanded = readings.time - lags.regressor
     attitude = interpolate(readings.attitude, measured)
-    before = interpolate(readings.attitude, measured - _RATE_STEP_S)
-    after = interpolate(readings.attitude, measured + _RATE_STEP_S)
-    down = gravity_direction(attitude[:, 0], attitude[:, 1])
-    down_rate = (
-        gravity_direction(after[:, 0], after[:, 1]) - gravity_direction(before[:, 0], before[:, 1])
-    ) / (2 * _RATE_STEP_S)
-    applied = commanded - readings.applied_later
+    tilt = Series(readings.attitude.time, readings.attitude.value[:, :2])
+    before, after = (
+        gravity_direction(*interpolate(tilt, measured + step).T)
+        for step in (-_RATE_STEP_S, _RATE_STEP_S)
+    )
+    later = lags.regressor + readings.applied_later if lags.applied is None else lags.applied
+    applied = readings.time - later
     raw, raw_rate = _undo(readings, in_force, applied)
     return Samples(
         compass=readings.compass,
@@ -67,8 +67,8 @@ def sample(
         raw_rate=raw_rate,
         present=_as_now(readings, raw, in_force, applied),
         attitude=attitude,
-        down=down,
-        down_rate=down_rate,
+        down=gravity_direction(attitude[:, 0], attitude[:, 1]),
+        down_rate=(after - before) / (2 * _RATE_STEP_S),
         u=_columns(interpolate(control.series, commanded)),
         u_rate=_columns(_rate(control.series, commanded)),
     )
@@ -112,7 +112,7 @@ def _undo(
             series = Series(series.time, stretch.multiplied(series.value))
             added = stretch.correction.added
             field = field - added(interpolate(series, applied[rows]))
-            # d/dlag of −MOT·u(t − lag) is +MOT·u̇.
+            # The derivative of −MOT·u(t − applied) by applied is +MOT·u̇.
             raw_rate[rows] = added(_rate(series, applied[rows])) @ inverse.T
         raw[rows] = field @ inverse.T - stretch.correction.offset
     return raw, raw_rate

@@ -44,31 +44,33 @@ class Noise:
     control: float
 
 
-def whitened(rows: FloatArray, pulls: FloatArray, noise: Noise) -> FloatArray:
-    """Residuals (n, 2) or slopes (n, 2, k) made independent, still in mGauss of the sensor.
+def whitened(columns: FloatArray, pulls: FloatArray, noise: Noise) -> FloatArray:
+    """Residuals (2, n) or slopes (k, 2, n) made independent, still in mGauss of the sensor.
 
     Parameters
     ----------
-    rows
+    columns
         What to whiten.
     pulls
-        Change of the residuals by one unit of u, shape (n, 2).
+        Change of the residuals by one unit of u, shape (2, n).
     noise
         The sizes of the errors.
 
     Notes
     -----
-    L⁻¹ · rows with L Lᵀ = diag(σ²) + σᵤ² a aᵀ, times σ: without errors of u nothing changes.
+    L⁻¹ · columns with L Lᵀ = diag(σ²) + σᵤ² a aᵀ, times σ: without errors of u nothing changes.
     """
     first, second = noise.sensor
     shared = noise.control * pulls
-    one = np.hypot(first, shared[:, 0])
-    mixed = shared[:, 0] * shared[:, 1] / one
-    two = np.sqrt(np.maximum(second**2 + shared[:, 1] ** 2 - mixed**2, 1e-12))
-    more = (slice(None), *[None] * (rows.ndim - 2))
-    top = rows[:, 0] / one[more]
-    bottom = (rows[:, 1] - mixed[more] * top) / two[more]
-    return np.stack([first * top, second * bottom], axis=1)
+    one = np.sqrt(first**2 + shared[0] ** 2)
+    mixed = shared[0] * shared[1] / one
+    two = np.sqrt(np.maximum(second**2 + shared[1] ** 2 - mixed**2, 1e-12))
+    made = np.empty_like(columns)
+    top, bottom = made[..., 0, :], made[..., 1, :]
+    np.multiply(columns[..., 0, :], first / one, out=top)
+    np.multiply(columns[..., 1, :], second / two, out=bottom)
+    bottom -= top * (mixed * second / (first * two))
+    return made
 
 
 def noise_of(values: FloatArray, pulls: FloatArray, spread_u: float) -> Noise | None:
@@ -77,7 +79,7 @@ def noise_of(values: FloatArray, pulls: FloatArray, spread_u: float) -> Noise | 
     Parameters
     ----------
     values, pulls
-        Residuals, and their change by one unit of u, shape (n, 2).
+        Residuals, and their change by one unit of u, shape (2, n).
     spread_u
         Standard deviation of u.
 
@@ -86,30 +88,26 @@ def noise_of(values: FloatArray, pulls: FloatArray, spread_u: float) -> Noise | 
     Expectation maximisation with the error of u as the hidden factor; readings far out count
     less.
     """
-    sensor = spread_of(values)
-    signal = float(np.median(np.linalg.norm(pulls, axis=1))) * spread_u
+    sensor = spread_of(values.T)
+    signal = float(np.median(np.hypot(*pulls))) * spread_u
     if signal < _LEAST_SIGNAL * float(np.linalg.norm(sensor)):
         return None
     most = MOST_SHARE * spread_u
     noise = Noise(sensor, most / 4)
+    squares, mixed = pulls**2, pulls * values
     for _ in range(_ROUNDS):
-        error = _error_of_control(values, pulls, noise)
-        left = values - pulls * error[:, None]
-        far = np.sum((left / noise.sensor) ** 2, axis=1) + (error / noise.control) ** 2
+        variance = noise.sensor**2
+        precision = squares[0] / variance[0] + squares[1] / variance[1] + 1.0 / noise.control**2
+        error = (mixed[0] / variance[0] + mixed[1] / variance[1]) / precision
+        left = (values - pulls * error) ** 2
+        far = left[0] / variance[0] + left[1] / variance[1] + (error / noise.control) ** 2
         weight = 1.0 / (1.0 + far / (2 * _ROBUST**2))
         weight /= np.sum(weight)
-        precision = np.sum((pulls / noise.sensor) ** 2, axis=1) + 1.0 / noise.control**2
-        control = float(np.sqrt(weight @ (error**2 + 1.0 / precision)))
-        spread = weight @ (left**2 + pulls**2 / precision[:, None])
+        doubt = weight / precision
+        control = float(np.sqrt(weight @ error**2 + np.sum(doubt)))
+        spread = left @ weight + squares @ doubt
         before = noise.control
         noise = Noise(np.maximum(np.sqrt(spread), NOISE_FLOOR), float(np.clip(control, 1e-3, most)))
         if abs(noise.control / before - 1.0) < _SETTLED:
             break
     return noise
-
-
-def _error_of_control(values: FloatArray, pulls: FloatArray, noise: Noise) -> FloatArray:
-    """The most probable error of u at each reading, shape (n,)."""
-    weighted = pulls / noise.sensor**2
-    precision = np.sum(weighted * pulls, axis=1) + 1.0 / noise.control**2
-    return np.asarray(np.sum(weighted * values, axis=1) / precision)

@@ -24,19 +24,20 @@ from magcomp.model import (
     unpack,
 )
 
-STRENGTH, SIN_DIP, FIELD_LAG, REGRESSOR_LAG = range(CORRECTION_SIZE, CORRECTION_SIZE + 4)
-TILT, LEAN = (
-    slice(CORRECTION_SIZE + 4, CORRECTION_SIZE + 6),
-    slice(CORRECTION_SIZE + 6, CORRECTION_SIZE + 8),
+STRENGTH, SIN_DIP, FIELD_LAG, REGRESSOR_LAG, APPLIED_LAG = range(
+    CORRECTION_SIZE, CORRECTION_SIZE + 5
 )
-NUISANCE = slice(CORRECTION_SIZE + 4, CORRECTION_SIZE + 8)
-SIZE = CORRECTION_SIZE + 8
+LAGS = slice(FIELD_LAG, APPLIED_LAG + 1)
+LEANS_S = (2.0, 8.0)
+"""How soon a lean that is held shows in the attitude: between these, for most filters."""
+
+TILT = slice(LAGS.stop, LAGS.stop + 2)
+LEAN = slice(TILT.stop, TILT.stop + 2 * len(LEANS_S))
+NUISANCE = slice(TILT.start, LEAN.stop)
+SIZE = LEAN.stop
 """Parameters where the control quantity has one part; other parts' motor vectors follow."""
 
 DIAGONAL, OFF_DIAGONAL = slice(6, 9), slice(9, 12)
-
-LEAN_S = 4.0
-"""How soon a lean that is held shows in the attitude."""
 
 
 def strength_and_dip(
@@ -60,6 +61,9 @@ def strength_and_dip(
     components the one along which it moves the reading is left out, and the two that remain are
     taken along the field (strength) and across it (dip). Slopes are those of the model's field,
     not of the noisy reading, so noise is not taken for soft iron (errors in variables).
+
+    In memory the readings are the last axis of everything here: what is done to a column then
+    runs along the memory, and the columns of a least-squares problem lie one after the other.
     """
     return rows_of(samples, parameters, noise)[:2]
 
@@ -68,95 +72,131 @@ def rows_of(
     samples: Samples, parameters: FloatArray, noise: Noise | None
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """As :func:`strength_and_dip`, with the change of both residuals by one unit of u, (n, 2)."""
-    values, slopes, pulls = _rows(samples, parameters)
-    if noise is None:
-        return values, slopes, pulls
-    together = np.concatenate([values[:, :, None], pulls[:, :, None], slopes], axis=2)
-    made = whitened(together, pulls, noise)
-    return made[:, :, 0], made[:, :, 2:], made[:, :, 1]
+    return _rows(_columns(samples, parameters), noise)
 
 
-def _rows(samples: Samples, parameters: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Residuals, their derivatives, and their change by one unit of u, as they come."""
-    correction = correction_at(parameters)
-    strength, sine = parameters[STRENGTH], np.clip(parameters[SIN_DIP], -0.999, 0.999)
-    cosine = np.sqrt(1.0 - sine**2)
-    inverse: FloatArray = np.linalg.inv(correction.soft_iron).astype(np.float64)
-    corrected = correction.apply(samples.raw, samples.u)
-    down = samples.down
-    level = corrected - np.einsum("ij,ij->i", corrected, down)[:, None] * down
-    north = level / np.maximum(np.linalg.norm(level, axis=1), 1e-9)[:, None]
-    earth = strength * (cosine * north + sine * down)
-    axes = _axes(earth, down, inverse)
-    apart = (corrected - earth) @ inverse.T
-    pulled = [axis @ inverse for axis in axes]
-    slopes = np.empty((len(samples), 2, len(parameters)))
-    leaning = _leaning(samples)
-    for kind in range(2):
-        # A turn w of the body moves the field in body axes by w × b, which b × pulled weighs.
-        turned = _cross(earth, pulled[kind])
-        slopes[:, kind, TILT] = -turned[:, :2]
-        slopes[:, kind, LEAN] = -turned[:, :2] * leaning
-        slopes[:, kind, FIELD_LAG] = np.einsum("ij,ij->i", turned, _cross(down, samples.down_rate))
-    values = np.stack([np.einsum("ij,ij->i", axis, apart) for axis in axes], axis=1)
-    values += slopes[:, :, NUISANCE] @ parameters[NUISANCE]
-    pulls = np.stack([one @ correction.vector for one in pulled], axis=1)
-    centred = (earth - correction.added(samples.u)) @ inverse.T
-    pulled_rate = correction.added(samples.u_rate)
-    for kind, (axis, pull) in enumerate(zip(axes, pulled, strict=True)):
-        rows = slopes[:, kind, :]
-        rows[:, MOTOR] = pull * samples.u[:, :1]
-        for part, column in enumerate(range(SIZE, rows.shape[1], 3), start=1):
-            rows[:, column : column + 3] = pull * samples.u[:, part : part + 1]
-        rows[:, OFFSET] = axis
-        rows[:, DIAGONAL] = pull * centred
-        for column, (i, j) in enumerate(((0, 1), (0, 2), (1, 2)), start=9):
-            rows[:, column] = pull[:, i] * centred[:, j] + pull[:, j] * centred[:, i]
-        rows[:, STRENGTH] = -np.einsum("ij,ij->i", pull, earth) / strength
-        rows[:, SIN_DIP] = -strength * np.einsum("ij,ij->i", pull, down - sine / cosine * north)
-        rows[:, REGRESSOR_LAG] = np.einsum("ij,ij->i", axis, samples.raw_rate) - np.einsum(
-            "ij,ij->i", pull, pulled_rate
-        )
-    return values, slopes, pulls
-
-
-def _axes(
-    earth: FloatArray, down: FloatArray, inverse: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Unit vectors in sensor axes along the field and across it, both square to a turn."""
-    turn = _cross(down, earth) @ inverse.T
-    turn /= np.maximum(np.linalg.norm(turn, axis=1), 1e-9)[:, None]
-    along = earth @ inverse.T
-    along -= np.einsum("ij,ij->i", along, turn)[:, None] * turn
-    along /= np.maximum(np.linalg.norm(along, axis=1), 1e-9)[:, None]
-    return along, _cross(turn, along)
-
-
-def _cross(one: FloatArray, other: FloatArray) -> FloatArray:
-    """Vector products of rows; NumPy's own takes three times as long."""
-    ax, ay, az = one.T
-    bx, by, bz = other.T
-    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
-
-
-def _leaning(samples: Samples) -> FloatArray:
-    """Roll and pitch, slowly followed: what acceleration does to an attitude filter, (n, 2).
-
-    A multirotor accelerates where it leans, and its attitude filter takes the acceleration for
-    gravity within a few seconds.
-    """
-    if len(samples) < 2:
-        return np.zeros((len(samples), 2))
-    step = max(float(np.median(np.diff(samples.time))), 1e-3)
-    share = step / (LEAN_S + step)
-    tilt = samples.attitude[:, :2] - np.median(samples.attitude[:, :2], axis=0)
-    return low_pass(tilt, share)
+def rows_and_errors(
+    samples: Samples, parameters: FloatArray
+) -> tuple[tuple[FloatArray, FloatArray, FloatArray], Noise | None]:
+    """As :func:`rows_of` with the errors that the residuals show themselves, and those errors."""
+    columns = _columns(samples, parameters)
+    noise = _errors(samples, columns)
+    return _rows(columns, noise), noise
 
 
 def errors_of(samples: Samples, parameters: FloatArray) -> Noise | None:
     """The sizes of the errors at parameters near the solution, shape (SIZE,)."""
-    values, _, pulls = _rows(samples, parameters)
-    return noise_of(values, pulls, float(np.std(samples.total)))
+    return _errors(samples, _columns(samples, parameters))
+
+
+def _errors(samples: Samples, columns: FloatArray) -> Noise | None:
+    return noise_of(columns[0], columns[1], float(np.std(samples.total)))
+
+
+def _rows(columns: FloatArray, noise: Noise | None) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Values (n, 2), slopes (n, 2, SIZE) and pulls (n, 2), independent where the noise is known."""
+    made = columns if noise is None else whitened(columns, columns[1], noise)
+    return made[0].T, made[2:].T, made[1].T
+
+
+def _columns(samples: Samples, parameters: FloatArray) -> FloatArray:
+    """Residuals, their change by one unit of u, and their derivatives, shape (2 + SIZE, 2, n)."""
+    correction = correction_at(parameters)
+    inverse: FloatArray = np.linalg.inv(correction.soft_iron).astype(np.float64)
+    down, u = _across(samples.down), _across(samples.u)
+    corrected = _across(correction.apply(samples.raw, samples.u))
+    earth, by_dip = _earth(corrected, down, parameters)
+    axes = _axes(earth, down, inverse)
+    pulled = _turned(inverse, axes)
+    # A turn w of the body moves the field in body axes by w × b, which b × pulled weighs.
+    turned = _cross(earth[:, None], pulled)
+    centred = inverse @ (earth - _across(correction.added(samples.u)))
+
+    columns = np.empty((2 + len(parameters), 2, len(samples)))
+    slopes = columns[2:]
+    slopes[MOTOR] = pulled * u[0]
+    for part, column in enumerate(range(SIZE, len(slopes), 3), start=1):
+        slopes[column : column + 3] = pulled * u[part]
+    slopes[OFFSET] = axes
+    slopes[DIAGONAL] = pulled * centred[:, None]
+    for column, (i, j) in enumerate(((0, 1), (0, 2), (1, 2)), start=OFF_DIAGONAL.start):
+        slopes[column] = pulled[i] * centred[j] + pulled[j] * centred[i]
+    slopes[STRENGTH] = -_dot(pulled, earth[:, None]) / parameters[STRENGTH]
+    slopes[SIN_DIP] = -_dot(pulled, by_dip[:, None])
+    slopes[FIELD_LAG] = _dot(turned, _cross(down, _across(samples.down_rate))[:, None])
+    slopes[REGRESSOR_LAG] = -_dot(pulled, _across(correction.added(samples.u_rate))[:, None])
+    slopes[APPLIED_LAG] = _dot(axes, _across(samples.raw_rate)[:, None])
+    slopes[TILT] = -turned[:2]
+    for start, leaning in zip(range(LEAN.start, LEAN.stop, 2), _leaning(samples), strict=True):
+        slopes[start : start + 2] = slopes[TILT] * leaning[:, None]
+    columns[0] = _dot(axes, (inverse @ (corrected - earth))[:, None])
+    columns[0] += np.tensordot(parameters[NUISANCE], slopes[NUISANCE], axes=1)
+    columns[1] = np.tensordot(correction.vector, pulled, axes=1)
+    return columns
+
+
+def _earth(
+    corrected: FloatArray, down: FloatArray, parameters: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """The earth's field where each reading points, and its change by the dip's sine, (3, n)."""
+    strength, sine = parameters[STRENGTH], np.clip(parameters[SIN_DIP], -0.999, 0.999)
+    cosine = np.sqrt(1.0 - sine**2)
+    north = _unit(corrected - _dot(corrected, down) * down)
+    return strength * (cosine * north + sine * down), strength * (down - sine / cosine * north)
+
+
+def _axes(earth: FloatArray, down: FloatArray, inverse: FloatArray) -> FloatArray:
+    """Unit vectors in sensor axes along the field and across it, both square to a turn.
+
+    Shape (3, 2, n).
+    """
+    turn = _unit(inverse @ _cross(down, earth))
+    along = inverse @ earth
+    along = _unit(along - _dot(along, turn) * turn)
+    return np.stack([along, _cross(turn, along)], axis=1)
+
+
+def _across(rows: FloatArray) -> FloatArray:
+    """Rows (n, k) as columns (k, n) that lie one after the other in memory."""
+    return np.ascontiguousarray(rows.T)
+
+
+def _turned(matrix: FloatArray, vectors: FloatArray) -> FloatArray:
+    """A symmetric matrix times every vector of (3, 2, n)."""
+    return np.asarray((matrix @ vectors.reshape(3, -1)).reshape(vectors.shape))
+
+
+def _dot(one: FloatArray, other: FloatArray) -> FloatArray:
+    return np.asarray(one[0] * other[0] + one[1] * other[1] + one[2] * other[2])
+
+
+def _unit(vectors: FloatArray) -> FloatArray:
+    return np.asarray(vectors / np.maximum(np.sqrt(_dot(vectors, vectors)), 1e-9))
+
+
+def _cross(one: FloatArray, other: FloatArray) -> FloatArray:
+    """Vector products along the first axis; NumPy's own takes three times as long."""
+    return np.stack(
+        [
+            one[1] * other[2] - one[2] * other[1],
+            one[2] * other[0] - one[0] * other[2],
+            one[0] * other[1] - one[1] * other[0],
+        ]
+    )
+
+
+def _leaning(samples: Samples) -> list[FloatArray]:
+    """Roll and pitch, followed by each of LEANS_S: what acceleration does to attitude, (2, n) each.
+
+    A multirotor accelerates where it leans, and its attitude filter takes the acceleration for
+    gravity within seconds. A sum of a fast and a slow one comes near any in between, and near one
+    that lets go again, as the vehicle does when its drag has caught up with its lean.
+    """
+    if len(samples) < 2:
+        return [np.zeros((2, len(samples))) for _ in LEANS_S]
+    step = max(float(np.median(np.diff(samples.time))), 1e-3)
+    tilt = samples.attitude[:, :2] - np.median(samples.attitude[:, :2], axis=0)
+    return [low_pass(tilt, step / (each + step)).T for each in LEANS_S]
 
 
 def correction_at(parameters: FloatArray) -> Correction:
@@ -177,7 +217,8 @@ def parameters_of(fit: MotorFit, lags: Lags) -> FloatArray:
         [
             packed[:CORRECTION_SIZE],
             [fit.strength, fit.vertical / fit.strength, lags.field, lags.regressor],
-            np.zeros(SIZE - CORRECTION_SIZE - 4),
+            [lags.regressor if lags.applied is None else lags.applied],
+            np.zeros(SIZE - NUISANCE.start),
             packed[CORRECTION_SIZE:],
         ]
     )
@@ -189,8 +230,9 @@ def indices_of_correction(size: int) -> IntArray:
 
 
 def lags_of(parameters: FloatArray) -> Lags:
-    """The two lags among the parameters."""
-    return Lags(float(parameters[FIELD_LAG]), float(parameters[REGRESSOR_LAG]))
+    """The lags among the parameters."""
+    field, regressor, applied = parameters[LAGS].tolist()
+    return Lags(field, regressor, applied)
 
 
 def vertical_of(parameters: FloatArray) -> float:

@@ -8,7 +8,7 @@ heading cannot leak in::
     r₁ = |c| − F                (docs/method.md, Equation 4)
     r₂ = c · down − F sin(dip)
 
-Both lags are parameters like the others. How much is free follows from what the
+The lags are parameters like the others. How much is free follows from what the
 data can tell: the motor vector alone, then offsets, then the diagonal, then the
 off-diagonal of the soft iron, each group with the calibration in force as prior.
 """
@@ -24,8 +24,10 @@ from magcomp.align import sample, within
 from magcomp.earth import EarthField
 from magcomp.fit.control_noise import Noise
 from magcomp.fit.field_model import (
+    APPLIED_LAG,
     DIAGONAL,
     FIELD_LAG,
+    LAGS,
     LEAN,
     OFF_DIAGONAL,
     REGRESSOR_LAG,
@@ -37,6 +39,7 @@ from magcomp.fit.field_model import (
     errors_of,
     indices_of_correction,
     lags_of,
+    rows_and_errors,
     rows_of,
     strength_and_dip,
 )
@@ -49,7 +52,7 @@ from magcomp.fit.robust import (
     solve,
     time_blocks,
 )
-from magcomp.fit.wander import Posterior, Rows, mixed, posterior
+from magcomp.fit.wander import Posterior, Reduced, Rows, likeliest, mixed, posterior, weighed
 from magcomp.model import (
     CORRECTION_SIZE,
     MOTOR,
@@ -175,7 +178,8 @@ def prior(problem: Problem, free: int) -> Prior:
     mean[:CORRECTION_SIZE] = pack(present)[:CORRECTION_SIZE]
     mean[MOTOR] = 0.0
     mean[[STRENGTH, SIN_DIP]] = earth.strength, np.sin(earth.dip)
-    mean[[FIELD_LAG, REGRESSOR_LAG]] = LAG_MEAN_S
+    mean[LAGS] = LAG_MEAN_S
+    mean[APPLIED_LAG] += problem.readings.applied_later
     width = np.zeros(size)
     # Differences that a flight does not show at all must not come out as known to be nothing.
     width[MOTOR] = width[SIZE:] = np.inf if problem.control.parts == 1 else EACH_MOTOR_MGAUSS_PER_A
@@ -185,7 +189,7 @@ def prior(problem: Problem, free: int) -> Prior:
     # A free shape and a free strength are one number too many: scale is then the model's.
     width[STRENGTH] = (1e-4 if free >= 3 else SCALE_WIDTH) * earth.strength
     width[SIN_DIP] = DIP_WIDTH
-    width[[FIELD_LAG, REGRESSOR_LAG]] = LAG_WIDTH_S
+    width[LAGS] = LAG_WIDTH_S
     width[TILT], width[LEAN] = TILT_WIDTH_RAD, LEAN_WIDTH
     return Prior(mean, width)
 
@@ -222,7 +226,7 @@ def estimate(
     free
         1 … 4.
     start
-        Parameters to begin at, shape (16,); the prior's mean by default.
+        Parameters to begin at, shape (SIZE,); the prior's mean by default.
     hold_lags
         Keep the lags of ``start``.
     errors
@@ -236,7 +240,7 @@ def estimate(
     known = _with_lags_held(prior(problem, free)) if hold_lags else prior(problem, free)
     begin = known.mean if start is None else np.where(known.width > 0, start, known.mean)
     if hold_lags and start is not None:
-        begin[[FIELD_LAG, REGRESSOR_LAG]] = start[[FIELD_LAG, REGRESSOR_LAG]]
+        begin[LAGS] = start[LAGS]
     fixed = problem.sample(lags_of(begin)) if hold_lags else None
     search = with_covariance and errors is None
 
@@ -274,7 +278,7 @@ def near(problem: Problem, free: int, start: FloatArray) -> FloatArray:
         What all readings gave, shape (SIZE,); its lags are kept.
     """
     samples = problem.sample(lags_of(start))
-    values, slopes = strength_and_dip(samples, start, errors_of(samples, start))
+    (values, slopes, _), _ = rows_and_errors(samples, start)
     return one_step(values, slopes, start, _with_lags_held(prior(problem, free)))
 
 
@@ -292,29 +296,32 @@ def with_wander(problem: Problem, found: FlightEstimate, free: int) -> tuple[Fli
         The groups that were open in it; they stand where no marginal solution is possible.
     """
 
-    def rows(parameters: FloatArray) -> Rows:
-        return rows_at(problem, parameters, found.errors)
+    def part_at(parameters: FloatArray) -> Reduced:
+        return weighed(rows_at(problem, parameters, found.errors))
 
     calibrated = is_calibrated(problem.readings.in_force[-1].correction)
+    beliefs = [
+        (groups, _believed(problem, offset, soft_iron, is_open=groups == len(GROUPS)), share)
+        for groups, offset, soft_iron, share in (_BELIEFS if calibrated else _BELIEFS[:1])
+    ]
+    first = part_at(found.parameters)
+    wander = likeliest(first, beliefs[0][1], found.parameters)
+    if not wander.shows:
+        # Least squares is less sensitive to a current that is wrong for seconds.
+        return found, free
     each: dict[int, Posterior] = {}
-    wander = None
-    for groups, offset, soft_iron, share in _BELIEFS if calibrated else _BELIEFS[:1]:
-        known = _believed(problem, offset, soft_iron, is_open=groups == len(GROUPS))
-        one = posterior(rows, found.parameters, known, is_physical, wander)
-        if one is not None and not one.wander.shows:
-            # Least squares is less sensitive to a current that is wrong for seconds.
-            return found, free
+    for groups, known, share in beliefs:
+        one = posterior(part_at, found.parameters, known, is_physical, wander, first)
         if one is not None:
             each[groups] = replace(one, evidence=one.evidence + float(np.log(share)))
-            wander = one.wander
     if not each:
         return found, free
     answer = mixed(each.values())
-    likeliest = max(each, key=lambda groups: each[groups].evidence)
+    likely = max(each, key=lambda groups: each[groups].evidence)
     if not is_physical(answer.parameters):
-        answer = each[likeliest]
+        answer = each[likely]
     covariance = _SIZES_UNKNOWN**2 * answer.covariance
-    moved = 1 if likeliest == 1 else len(GROUPS)
+    moved = 1 if likely == 1 else len(GROUPS)
     return replace(found, parameters=answer.parameters, covariance=covariance), moved
 
 
@@ -335,7 +342,7 @@ def _believed(problem: Problem, offset: float, soft_iron: float, *, is_open: boo
 
 def _with_lags_held(known: Prior) -> Prior:
     width = known.width.copy()
-    width[[FIELD_LAG, REGRESSOR_LAG]] = 0.0
+    width[LAGS] = 0.0
     return Prior(known.mean, width)
 
 
@@ -346,7 +353,7 @@ def drift_blocks(time: FloatArray) -> IntArray:
 
 
 def estimate_lags(problem: Problem, correction: Correction) -> tuple[Lags, Lags]:
-    """Both lags and their standard errors for a correction that is known already.
+    """The lags and their standard errors for a correction that is known already.
 
     Parameters
     ----------
@@ -386,7 +393,7 @@ def is_physical(parameters: FloatArray) -> bool:
     A mirrored soft iron fits strength and dip as well and turns the heading by 180°.
     """
     values = np.linalg.eigvalsh(symmetric(parameters[SOFT_IRON]))
-    lags = np.abs(parameters[[FIELD_LAG, REGRESSOR_LAG]])
+    lags = np.abs(parameters[LAGS])
     return bool(values[0] > 0.3 and values[-1] < 3.0 and np.all(lags < LAG_MOST_S))
 
 

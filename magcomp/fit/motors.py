@@ -14,7 +14,7 @@ import numpy as np
 
 from magcomp.fit.field_model import SIZE
 from magcomp.fit.robust import Estimate
-from magcomp.fit.wander import Rows, starts_of, weighed
+from magcomp.fit.wander import Rows, starts_of, weights_and_rest
 from magcomp.model import MOTOR, FloatArray
 
 _WIDTHS = np.concatenate([[0.0], np.geomspace(0.01, 100.0, 41)])
@@ -74,7 +74,7 @@ def shared_error(rows: Rows, tell: FloatArray) -> float:
     neighbours err alike. So the square of the sum of their scores is compared with the sum of
     their squares. What lasts for longer than a second is a state of its own.
     """
-    weights, left = weighed(rows.time, rows.values)
+    weights, left = weights_and_rest(rows.time, rows.values)
     scores = np.einsum("ngi,ng->ni", rows.slopes @ tell.T, weights * left)
     together = np.add.reduceat(scores, starts_of(rows.time), axis=0)
     apart = np.sum(scores**2, axis=0)

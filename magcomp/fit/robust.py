@@ -176,19 +176,28 @@ def one_step(
     """
     moving = prior.width > 0.0
     scale = spread_of(values)
-    weights = _weights(values / scale) / scale**2
-    design = _columns(slopes, moving).reshape(-1, int(moving.sum()))
-    weighted = design * weights.reshape(-1, 1)
+    hessian, gradient = _normal(values, slopes, _weights(values / scale) / scale**2, moving)
     precision = prior.precision[moving]
-    gradient = weighted.T @ values.reshape(-1) + precision * (start - prior.mean)[moving]
+    gradient += precision * (start - prior.mean)[moving]
     parameters = start.astype(np.float64)
-    hessian = weighted.T @ design + np.diag(precision)
-    parameters[moving] -= np.linalg.pinv(hessian, hermitian=True) @ gradient
+    parameters[moving] -= np.linalg.pinv(hessian + np.diag(precision), hermitian=True) @ gradient
     return parameters
 
 
+def _normal(
+    values: FloatArray, slopes: FloatArray, weights: FloatArray, moving: BoolArray
+) -> tuple[FloatArray, FloatArray]:
+    """Information matrix and gradient of weighted residuals, of the parameters that move."""
+    root = np.sqrt(weights)
+    rooted = _columns(slopes, moving) * root.T
+    flat = rooted.reshape(len(rooted), -1)
+    # A matrix times its own transpose takes half the multiplications.
+    return flat @ flat.T, flat @ (values * root).T.reshape(-1)
+
+
 def _columns(slopes: FloatArray, moving: BoolArray) -> FloatArray:
-    return slopes if moving.all() else slopes[:, :, moving]
+    """The derivatives by each parameter that moves, one after the other, shape (m, g, n)."""
+    return np.asarray(slopes.T if moving.all() else slopes.T[moving])
 
 
 def spread_of(values: FloatArray, floor: float = NOISE_FLOOR) -> FloatArray:
@@ -233,10 +242,9 @@ def _descend(
     damping = _DAMPING_START
     for _ in range(_STEPS):
         weights = _weights(values / scale) / scale**2
-        design = _columns(slopes, moving).reshape(-1, int(moving.sum()))
-        weighted = design * weights.reshape(-1, 1)
-        hessian = design.T @ weighted + np.diag(precision)
-        gradient = weighted.T @ values.reshape(-1) + precision * (parameters - prior.mean)[moving]
+        hessian, gradient = _normal(values, slopes, weights, moving)
+        hessian += np.diag(precision)
+        gradient += precision * (parameters - prior.mean)[moving]
         progress = False
         while damping < _DAMPING_MOST:
             damped = hessian + damping * np.diag(np.diag(hessian) + 1e-12)
@@ -275,17 +283,15 @@ def _covariance(
     """Sandwich covariance with scores summed over blocks, shrunk where blocks are few."""
     moving = prior.width > 0.0
     size = int(moving.sum())
-    design = _columns(slopes, moving)
-    flat = design.reshape(-1, size)
     # The slope of the score: d(w·z)/dz of the soft-L1 loss is w³, not w.
-    data = flat.T @ (flat * bend.reshape(-1, 1))
+    data, _ = _normal(values, slopes, bend, moving)
     precision = np.diag(prior.precision[moving])
     bread = np.linalg.pinv(data + precision + 1e-12 * np.eye(size), hermitian=True)
-    scores = np.einsum("ngi,ng,ng->ni", design, weights, values, optimize=True)
+    scores = np.sum(_columns(slopes, moving) * (weights * values).T, axis=1)
     starts = np.flatnonzero(np.r_[True, np.diff(blocks) != 0])
-    per_block = np.add.reduceat(scores, starts, axis=0)
-    count = len(per_block)
-    meat = per_block.T @ per_block * (count / max(count - 1, 1))
+    per_block = np.add.reduceat(scores, starts, axis=1)
+    count = len(starts)
+    meat = per_block @ per_block.T * (count / max(count - 1, 1))
     # With few blocks the summed scores say little about each direction: lean on one common factor.
     inflation = max(1.0, float(np.trace(np.linalg.pinv(data) @ meat)) / size)
     trust = count / (count + 4.0 * size)

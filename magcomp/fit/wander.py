@@ -86,7 +86,7 @@ class Reduced:
     mixed
         Between the states and the parameters with the residuals as a last column, (m, 6, k + 1).
     whole
-        Of the parameters and the residuals, shape (m, k + 1, k + 1).
+        Of the parameters and the residuals of all stretches, shape (k + 1, k + 1).
     """
 
     time: FloatArray
@@ -137,24 +137,23 @@ def reduced(rows: Rows, weights: FloatArray) -> Reduced:
     weights
         One over the variance of each residual, shape (n, 2).
     """
-    time, values, slopes = rows.time, rows.values, rows.slopes
-    starts = starts_of(time)
-    states = np.concatenate(
-        [slopes[:, :, TILT], slopes[:, :, OFFSET], rows.pulls[:, :, None]], axis=2
-    )
-    columns = np.concatenate([slopes, values[:, :, None]], axis=2)
-    weighted = columns * weights[:, :, None]
-
-    def summed(left: FloatArray, right: FloatArray) -> FloatArray:
-        each = np.matmul(left.transpose(0, 2, 1), right)
-        return np.asarray(np.add.reduceat(each, starts, axis=0))
-
-    count = np.diff(np.r_[starts, len(time)])
+    starts = starts_of(rows.time)
+    slopes, values, pulls = rows.slopes.T, rows.values.T[np.newaxis], rows.pulls.T[np.newaxis]
+    columns = np.concatenate([slopes, values, pulls])
+    weighted = columns * weights.T
+    states = [*range(TILT.start, TILT.stop), *range(OFFSET.start, OFFSET.stop), len(columns) - 1]
+    sums = np.stack(
+        [
+            np.add.reduceat(np.sum(weighted * columns[state], axis=1), starts, axis=1)
+            for state in states
+        ]
+    ).transpose(2, 0, 1)
+    flat = columns[:-1].reshape(len(columns) - 1, -1)
     return Reduced(
-        time=np.add.reduceat(time, starts) / count,
-        states=summed(states * weights[:, :, None], states),
-        mixed=summed(states, weighted),
-        whole=summed(columns, weighted),
+        time=np.add.reduceat(rows.time, starts) / np.diff(np.r_[starts, len(rows.time)]),
+        states=sums[:, :, states],
+        mixed=sums[:, :, :-1],
+        whole=flat @ weighted[:-1].reshape(len(flat), -1).T,
     )
 
 
@@ -168,42 +167,68 @@ def marginal(part: Reduced, wander: Wander) -> tuple[FloatArray, float]:
     float
         −½ log det of what the states' precision gained: what the likelihood loses to them.
     """
-    # SciPy takes a second to import: only where there is something to fit.
-    from scipy.linalg.lapack import dpbtrf, dtbtrs  # noqa: PLC0415
-
-    band, prior_log_det = _prior_band(part.time, wander)
-    size = len(part.time) * STATES
-    for row in range(STATES):
-        for column in range(row + 1):
-            band[row - column, column:size:STATES] += part.states[:, row, column]
-    factor, trouble = dpbtrf(band, lower=1, overwrite_ab=1)
-    if trouble:
-        raise np.linalg.LinAlgError("the states' precision must be positive definite")
-    log_det = 2.0 * float(np.sum(np.log(factor[0])))
-    # With S = L·Lᵀ, mᵀ·S⁻¹·m is the square of L⁻¹·m: half of a solution is enough.
-    half, _ = dtbtrs(factor, part.mixed.reshape(size, -1), uplo="L")
-    return part.whole.sum(axis=0) - half.T @ half, -0.5 * (log_det - prior_log_det)
+    own, between, prior_log_det = _prior_precision(part.time, wander)
+    blocks = part.states.copy()
+    np.einsum("mss->ms", blocks)[...] += own
+    taken, log_det = _eliminated(blocks, between[:, :, np.newaxis] * np.eye(STATES), part.mixed)
+    return part.whole - taken, -0.5 * (log_det - prior_log_det)
 
 
-def _prior_band(time: FloatArray, wander: Wander) -> tuple[FloatArray, float]:
-    """Lower band of the states' prior precision, shape (7, 6 m), and its log determinant."""
-    count = len(time)
-    band = np.zeros((STATES + 1, count * STATES))
-    log_det = 0.0
-    apart = np.diff(time)
-    kinds = [(wander.tilt_rad, wander.tilt_s)] * 2 + [(wander.drift_mgauss, wander.drift_s)] * 3
-    kinds += [(wander.control_share, wander.control_s)]
-    for state, (size, constant) in enumerate(kinds):
-        kept = np.exp(-apart / constant)
-        news = size**2 * np.maximum(1.0 - kept**2, 1e-9)
-        diagonal = np.zeros(count)
-        diagonal[0] = 1.0 / size**2
-        diagonal[1:] += 1.0 / news
-        diagonal[:-1] += kept**2 / news
-        band[0, state::STATES] = diagonal
-        band[STATES, state : (count - 1) * STATES : STATES] = -kept / news
-        log_det -= 2.0 * np.log(size) + float(np.sum(np.log(news)))
-    return band, log_det
+def _eliminated(
+    blocks: FloatArray, between: FloatArray, right: FloatArray
+) -> tuple[FloatArray, float]:
+    """What a block-tridiagonal precision S takes from the columns b it meets: bᵀ S⁻¹ b, log det S.
+
+    Parameters
+    ----------
+    blocks
+        On the diagonal, shape (m, s, s).
+    between
+        Rows of each block's successor and columns of its own, shape (m − 1, s, s).
+    right
+        The columns, shape (m, s, k).
+
+    Notes
+    -----
+    Every other block is eliminated at once, and again of those that are left: few steps over many
+    blocks instead of many over one. SciPy's solver of bands is no faster, and takes longer to
+    import than a fit takes.
+    """
+    # Where one block is left, it goes; else every second one, between the others.
+    first = min(len(blocks) - 1, 1)
+    gone, here = blocks[first::2], right[first::2]
+    inverse = np.linalg.inv(gone)
+    at_here = inverse @ here
+    count = right.shape[2]
+    taken = here.reshape(-1, count).T @ at_here.reshape(-1, count)
+    log_det = 2.0 * float(np.sum(np.log(np.linalg.cholesky(gone).diagonal(axis1=1, axis2=2))))
+    if not first:
+        return taken, log_det
+    blocks, right = blocks[::2].copy(), right[::2].copy()
+    followed = slice(len(blocks) - 1)
+    before, after = between[::2], between[1::2]
+    at_before = inverse @ before
+    blocks[: len(gone)] -= before.transpose(0, 2, 1) @ at_before
+    right[: len(gone)] -= before.transpose(0, 2, 1) @ at_here
+    blocks[1:] -= after @ inverse[followed] @ after.transpose(0, 2, 1)
+    right[1:] -= after @ at_here[followed]
+    of_others, log_det_of_others = _eliminated(blocks, -after @ at_before[followed], right)
+    return taken + of_others, log_det + log_det_of_others
+
+
+def _prior_precision(time: FloatArray, wander: Wander) -> tuple[FloatArray, FloatArray, float]:
+    """The states' own prior precision (m, 6), that between stretches (m − 1, 6), and log det."""
+    apart = np.diff(time)[:, np.newaxis]
+    size = np.array([wander.tilt_rad] * 2 + [wander.drift_mgauss] * 3 + [wander.control_share])
+    constant = np.array([wander.tilt_s] * 2 + [wander.drift_s] * 3 + [wander.control_s])
+    kept = np.exp(-apart / constant)
+    news = size**2 * np.maximum(1.0 - kept**2, 1e-9)
+    own = np.zeros((len(time), STATES))
+    own[0] = 1.0 / size**2
+    own[1:] += 1.0 / news
+    own[:-1] += kept**2 / news
+    log_det = -2.0 * float(np.sum(np.log(size))) - float(np.sum(np.log(news)))
+    return own, -kept / news, log_det
 
 
 @dataclass(frozen=True, eq=False)
@@ -282,18 +307,19 @@ def _posterior(
 
 
 def posterior(
-    rows_at: Callable[[FloatArray], Rows],
+    part_at: Callable[[FloatArray], Reduced],
     start: FloatArray,
     prior: Prior,
     feasible: Callable[[FloatArray], bool],
-    wander: Wander | None = None,
+    wander: Wander,
+    part: Reduced | None = None,
 ) -> Posterior | None:
     """The parameters with both processes marginalised; None where the steps run away.
 
     Parameters
     ----------
-    rows_at
-        The model: parameters, shape (SIZE,), to readings.
+    part_at
+        The model: parameters, shape (SIZE,), to what :func:`weighed` makes of the readings.
     start
         Near the solution, shape (SIZE,).
     prior
@@ -301,27 +327,31 @@ def posterior(
     feasible
         Whether parameters are possible.
     wander
-        The processes where known; the likeliest at ``start`` otherwise.
+        The processes.
+    part
+        What ``part_at`` makes of ``start``, where known already.
     """
     at, found = start, None
     for _ in range(_STEPS):
-        rows = rows_at(at)
-        part = reduced(rows, _weights(rows.time, rows.values))
-        if wander is None:
-            wander = likeliest(part, prior, at)
-        found = _posterior(*marginal(part, wander), prior, at, wander)
+        found = _posterior(*marginal(part or part_at(at), wander), prior, at, wander)
+        part = None
         if not np.all(np.isfinite(found.parameters)) or not feasible(found.parameters):
             return None
         at = found.parameters
     return found
 
 
+def weighed(rows: Rows) -> Reduced:
+    """Sums over stretches, each reading with the weight that its neighbours give it."""
+    return reduced(rows, _weights(rows.time, rows.values))
+
+
 def _weights(time: FloatArray, values: FloatArray) -> FloatArray:
     """One over the variance of each residual: white noise from neighbours, outliers less."""
-    return weighed(time, values)[0]
+    return weights_and_rest(time, values)[0]
 
 
-def weighed(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+def weights_and_rest(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Weights of residuals, and what of each its neighbours do not have too, shape (n, 2) both."""
     close = np.diff(time) < 2.0
     steps = np.diff(values, axis=0)[close] if close.any() else values

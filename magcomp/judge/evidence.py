@@ -21,6 +21,7 @@ def used_lags(fit: MotorFit) -> Lags:
     return Lags(
         0.0 if np.isnan(fit.lags.field) else fit.lags.field,
         0.0 if np.isnan(fit.lags.regressor) else fit.lags.regressor,
+        fit.lags.applied,
     )
 
 

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from magcomp.live.guide import Guidance
+from magcomp.live.forecast import FEWEST, seconds_until
+from magcomp.live.guide import FINE_DEG, LONG_S, Guidance
 from magcomp.live.situation import Situation, Vector
 from magcomp.model import Analysis, Grade
 
@@ -34,11 +35,14 @@ class Bound:
     degrees
         Heading error of the worst compass that is not rejected, at most (95 %): one for each
         analysis so far that gave one, oldest first.
+    enough_at_s
+        Seconds of recording at which it is likely to be enough; None where nobody can tell.
     """
 
     u: float
     regressor: str
     degrees: tuple[float, ...]
+    enough_at_s: float | None = None
 
 
 class HeadingRing:
@@ -76,6 +80,9 @@ class HoverBound:
         self._loads: dict[str, Counter[float]] = {}
         self._analysis: Analysis | None = None
         self._bound: Bound | None = None
+        self._flown_s = 0.0
+        self._last_s = 0.0
+        self._largest: list[tuple[float, float]] = []
 
     @property
     def bound(self) -> Bound | None:
@@ -83,9 +90,16 @@ class HoverBound:
         return self._bound
 
     def look(
-        self, armed: bool | None, loads: dict[str, float | None], analysis: Analysis | None
+        self,
+        armed: bool | None,
+        loads: dict[str, float | None],
+        analysis: Analysis | None,
+        recorded_s: float,
     ) -> None:
-        """Take one look at the loads, by control quantity, and the newest analysis."""
+        """Take one look at the loads, by control quantity, and the newest analysis so far."""
+        if armed:
+            self._flown_s += max(recorded_s - self._last_s, 0.0)
+        self._last_s = recorded_s
         for regressor, load in loads.items():
             if armed and load is not None:
                 self._loads.setdefault(regressor, Counter())[round(load, 2)] += 1
@@ -96,7 +110,33 @@ class HoverBound:
         if found is None:
             return
         before = () if self._bound is None else self._bound.degrees
-        self._bound = replace(found, degrees=(*before, *found.degrees)[-_MOST_BOUNDS:])
+        self._largest = [
+            *self._largest[1 - _MOST_BOUNDS :],
+            (self._flown_s, largest_bound(analysis)),
+        ]
+        self._bound = replace(
+            found,
+            degrees=(*before, *found.degrees)[-_MOST_BOUNDS:],
+            enough_at_s=self._enough_at_s(recorded_s),
+        )
+
+    def _enough_at_s(self, recorded_s: float) -> float | None:
+        """When the guide will be content with the bound: it is fine, or waited for long enough."""
+        fine = seconds_until(FINE_DEG, self._largest)
+        if len(self._largest) < FEWEST or recorded_s >= LONG_S:
+            return None
+        return LONG_S if fine is None else min(recorded_s + fine - self._flown_s, LONG_S)
+
+
+def largest_bound(analysis: Analysis | None) -> float:
+    """Largest heading error, 95 %, of the compasses not rejected, degrees; infinite without one."""
+    errors = [
+        error.p95
+        for result in (analysis.compasses if analysis else ())
+        if result.verdict.grade is not Grade.REJECTED
+        for error in result.verdict.heading_error
+    ]
+    return max(errors, default=math.inf)
 
 
 def hover_bound(analysis: Analysis, hover: dict[str, float]) -> Bound | None:

@@ -30,12 +30,12 @@ from magcomp.live.guide import (
 )
 from magcomp.live.latest import Now
 from magcomp.live.prepare import Preparation
-from magcomp.live.progress import Enough, HeadingRing, HoverBound
+from magcomp.live.progress import Enough, HeadingRing, HoverBound, largest_bound
 from magcomp.live.refit import Refit
 from magcomp.live.situation import Look, Manoeuvre, SituationWatch
 from magcomp.live.snapshot import LiveSnapshot, compasses_now, slow_streams, warnings
 from magcomp.live.tap import Tap
-from magcomp.model import CURRENT, THROTTLE, Analysis, Grade, Vehicle
+from magcomp.model import CURRENT, THROTTLE, Vehicle
 
 LOOK_S = 0.2
 _GAP_TOLD_S = 20.0
@@ -54,6 +54,8 @@ class Watch:
         The computer's clocks.
     refit
         How the fitting stands.
+    hurry
+        Has everything fitted at once; tells whether anybody fits.
     """
 
     def __init__(
@@ -63,12 +65,16 @@ class Watch:
         preparation: Preparation,
         clock: Clock,
         refit: Callable[[], Refit],
+        hurry: Callable[[], bool],
     ) -> None:
         self._connection = connection
         self._tap = tap
         self._preparation = preparation
         self._clock = clock
         self._refit = refit
+        self._hurry = hurry
+        self._was_armed = False
+        self._wanted = 0
         self._opened = clock.monotonic()
         self._situation = SituationWatch()
         self._ring = HeadingRing()
@@ -107,7 +113,16 @@ class Watch:
         self._situation.update(Look(seconds, now.armed, now.attitude, now.height_m, now.accel))
         self._ring.look(now.armed, now.attitude, now.throttle)
         loads = {CURRENT: now.current, THROTTLE: now.throttle}
-        self._hover.look(now.armed, loads, self._refit().analysis)
+        self._hover.look(now.armed, loads, self._refit().analysis, seconds)
+        self._look_for_landing(now.armed)
+
+    def _look_for_landing(self, armed: bool | None) -> None:
+        """Whoever has landed waits for the answer: fit the whole flight at once."""
+        if self._was_armed and armed is False:
+            wanted = self._refit().hurried + 1
+            self._wanted = wanted if self._hurry() else 0
+        if armed is not None:
+            self._was_armed = armed
 
     @property
     def elapsed_s(self) -> float:
@@ -190,8 +205,9 @@ class Watch:
             seconds=self._tap.seconds(vehicle),
             grade=None if refit.analysis is None else refit.analysis.grade,
             stable_refits=refit.stable,
-            bound_deg=_bound_deg(refit.analysis),
+            bound_deg=largest_bound(refit.analysis),
             was_enough=self._enough.reached(self._situation.situation),
+            answered=refit.hurried >= self._wanted,
         )
 
     def _guidance(self, vehicle: Vehicle | None, view: View) -> Guidance:
@@ -232,17 +248,6 @@ class Watch:
         if self._tap.failure:
             found.insert(0, self._tap.failure.rstrip("."))
         return tuple(found)
-
-
-def _bound_deg(analysis: Analysis | None) -> float:
-    """Largest heading error, 95 %, of the compasses that are not rejected."""
-    errors = [
-        error.p95
-        for result in (analysis.compasses if analysis else ())
-        if result.verdict.grade is not Grade.REJECTED
-        for error in result.verdict.heading_error
-    ]
-    return max(errors, default=math.inf)
 
 
 def _wanted_deg(view: View) -> float | None:

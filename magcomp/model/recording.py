@@ -54,7 +54,7 @@ def interpolate(series: Series, time: FloatArray) -> FloatArray:
     """
     if series.value.ndim == 1:
         return np.asarray(np.interp(time, series.time, series.value))
-    return np.stack([np.interp(time, series.time, column) for column in series.value.T], axis=1)
+    return np.array([np.interp(time, series.time, column) for column in series.value.T]).T
 
 
 @dataclass(frozen=True)

@@ -79,10 +79,14 @@ class Lags:
         A field reported at t was measured at t − field, on the clock of the attitude.
     regressor
         A field reported at t goes with the control quantity reported for t − regressor.
+    applied
+        The motor correction that was in force multiplied the control quantity reported for
+        t − applied; :attr:`Readings.applied_later` before t − regressor where None.
     """
 
     field: float = 0.0
     regressor: float = 0.0
+    applied: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,8 +178,8 @@ class Readings:
     corrected
         Whether what was in force is in ``reported``; False where the sensor's own field is.
     applied_later
-        What is in force was multiplied by a control quantity this much older than what disturbed
-        the reading, seconds.
+        What is in force was multiplied by a control quantity about this much older than what
+        disturbed the reading, seconds.
     told_offset, told_motor
         The offset and the motor correction of each reading as the log tells them, mGauss, shape
         (n, 3); None where only the parameters tell. They stand for those of ``in_force``.
@@ -222,7 +226,8 @@ class Samples:
     raw
         Sensor field in body axes, the autopilot's correction undone, mGauss, shape (n, 3).
     raw_rate
-        Change of ``raw`` per second of regressor lag (a motor correction was undone), shape (n, 3).
+        Change of ``raw`` per second by which the motor correction that was in force is taken to
+        have been applied later, shape (n, 3).
     present
         Field as the correction now in force corrects it, mGauss, shape (n, 3).
     attitude

@@ -5,8 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from once import analyse
 
-from magcomp.analysis import Options, analyse, parameter_set
+from magcomp.analysis import Options, parameter_set
 from magcomp.model import Grade, ParameterChange, ParameterHistory, Recording
 from magcomp.sources import read
 
@@ -72,7 +73,7 @@ def test_the_scale_in_force_stays_and_the_soft_iron_is_written_for_it(sweep):
 
 def test_a_rejected_fit_gives_no_parameters_unless_the_user_insists():
     flight = read(SWEEP.with_name("sweep_current.tlog"))
-    rejected = analyse(flight, Options(method="flight", end=30.0))
+    rejected = analyse(flight, Options(compass=1, method="flight", end=30.0))
     assert rejected.grade is Grade.REJECTED
     assert parameter_set(rejected).values == {}
     insisted = parameter_set(rejected, include_rejected=True).values

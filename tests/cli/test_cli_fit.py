@@ -19,6 +19,8 @@ from magcomp.cli.app import run
 from magcomp.report.files import SUFFIXES as REPORTS
 from magcomp.writing.files import SUFFIXES, read_parameter_file
 
+pytestmark = pytest.mark.usefixtures("fits_once")
+
 TRUTH = np.array(json.loads(SWEEP.with_suffix(".json").read_text())["mot_mgauss_per_amp"])
 
 ONE_OBJECT = {"magcomp", "source", "duration_s", "vehicle", "compasses"}

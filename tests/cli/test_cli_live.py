@@ -12,11 +12,11 @@ import threading
 
 import pytest
 from live_vehicle import COMPENSATION, PATIENCE_S, alive, free_port, held, landed
+from logs_made_of_logs import SWEEP
 
 from magcomp.cli.app import run
 from magcomp.errors import ExitCode
 from magcomp.model import ParameterSet
-from magcomp.simulate import write_tlog
 from magcomp.sources.tlog import read_tlog
 from magcomp.writing.files import read_parameter_file, write_parameter_file
 
@@ -233,9 +233,8 @@ def test_calibrate_guides_ends_when_the_pilot_disarms_fits_and_writes(
     tmp_path, data_directory, capsys
 ):
     answer, log = tmp_path / "a.param", tmp_path / "a.tlog"
-    with alive("sweep", speed=8.0) as flown:
+    with alive("sweep", speed=16.0) as flown:
         options = ("-o", answer, "--record", log, "--system", 1, "--upload", "--yes")
-        options += ("--seconds", 60)
         assert magcomp("calibrate", flown.address, *options) == ExitCode.GOOD
         found = read_parameter_file(answer).values
         assert all(flown.vehicle.parameters[name] == value for name, value in found.items())
@@ -250,9 +249,7 @@ def test_calibrate_guides_ends_when_the_pilot_disarms_fits_and_writes(
 
 def test_calibrate_prints_the_object_of_fit_and_nothing_else(tmp_path, capsys):
     log = tmp_path / "a.tlog"
-    with alive("sweep", speed=8.0) as flown:
-        options = ("--record", log, "--system", 1, "--json", "--seconds", 6)
-        assert magcomp("calibrate", flown.address, *options) == ExitCode.GOOD
+    assert magcomp("calibrate", f"{SWEEP},100x", "--record", log, "--json") == ExitCode.GOOD
     live = json.loads(capsys.readouterr().out)
     assert magcomp("fit", log, "--json") == ExitCode.GOOD
     assert json.loads(capsys.readouterr().out) == live
@@ -268,9 +265,9 @@ def test_too_short_a_recording_is_said_and_kept(tmp_path, capsys):
 
 
 def test_a_log_is_calibrated_as_if_it_were_flown_now(tmp_path, capsys):
-    write_tlog(tmp_path / "a.tlog", program="sweep", seed=3)
-    address = f"{tmp_path / 'a.tlog'},50x"
-    assert magcomp("calibrate", address, "--record", tmp_path / "b.tlog") == ExitCode.GOOD
+    address = f"{SWEEP},100x"
+    options = ("--record", tmp_path / "b.tlog", "--regressor", "current")
+    assert magcomp("calibrate", address, *options) == ExitCode.GOOD
     assert "COMPASS_MOT" in capsys.readouterr().out
     code = magcomp("calibrate", address, "--record", tmp_path / "c.tlog", "--upload", "--yes")
     assert code == ExitCode.USAGE
@@ -278,13 +275,15 @@ def test_a_log_is_calibrated_as_if_it_were_flown_now(tmp_path, capsys):
 
 def test_ctrl_c_keeps_what_was_recorded_and_goes_on_to_the_fit(tmp_path):
     log = tmp_path / "a.tlog"
-    with alive("sweep", speed=8.0) as flown:
+    with alive("sweep", speed=16.0) as flown:
         child = subprocess.Popen(
             [*MAGCOMP, "calibrate", flown.address, "--system", "1", "--record", str(log), "--json"],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
         )
-        wait_until(lambda: flown.vehicle.time > 60.0)
+        wait_until(lambda: flown.vehicle.armed)
+        half_way = flown.vehicle.time + 45.0
+        wait_until(lambda: flown.vehicle.time > half_way)
         child.send_signal(signal.SIGINT)
         out, err = child.communicate(timeout=PATIENCE_S)
     assert child.returncode == ExitCode.GOOD, err

@@ -1,6 +1,6 @@
 """``magcomp upload`` killed with SIGKILL at a message: no half of a calibration is ever in force.
 
-By default a dozen messages spread over the whole sequence; MAGCOMP_EVERY=1 in the
+By default half a dozen messages spread over the whole sequence; MAGCOMP_EVERY=1 in the
 environment takes them all, one by one.
 """
 
@@ -27,7 +27,7 @@ from magcomp.writing.journal import read_journal
 MESSAGES = 290
 """Parameter messages, both ways, of one whole upload; a test below proves that it is enough."""
 
-EVERY = int(os.environ.get("MAGCOMP_EVERY", "25"))
+EVERY = int(os.environ.get("MAGCOMP_EVERY", "50"))
 OLD_MOTOR = {f"COMPASS_MOT{n}_{axis}": 0.75 for n in ("", "2", "3") for axis in "XYZ"}
 PATIENCE_S = 60.0
 

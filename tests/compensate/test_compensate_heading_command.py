@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from logs_made_of_logs import COMPASSES as GYRO
 from logs_made_of_logs import CURRENT, SWEEP, THROTTLE, frames, write
+from once import analyse
 from truth import FIXTURES
 
-from magcomp.analysis import Options, analyse
+from magcomp.analysis import Options
 from magcomp.cli.app import run
 from magcomp.compensate import Tuning, track
 from magcomp.experiments.motion import accuracy
@@ -16,6 +17,8 @@ from magcomp.sources import read
 from magcomp.sources.truth import read_truth
 
 FLIGHT = str(FIXTURES / "flight.tlog")
+
+pytestmark = pytest.mark.usefixtures("fits_once")
 
 
 def document(capsys, *arguments):
@@ -35,9 +38,9 @@ def parameters(tmp_path_factory):
     ("name", "fused_rms"),
     [
         ("flight", 1.0),
-        ("flight_wrong_mot", 1.0),
+        pytest.param("flight_wrong_mot", 1.0, marks=pytest.mark.slow),
         ("flight_uncalibrated", 1.0),
-        ("mission_uncompensated", 1.5),
+        pytest.param("mission_uncompensated", 1.5, marks=pytest.mark.slow),
         ("mission_compensated", 1.0),
         ("turntable_five_levels", 1.5),
     ],

@@ -51,15 +51,18 @@ def test_an_uncalibrated_flight_that_tilts_gives_hard_and_soft_iron_too(seed):
     assert np.linalg.norm(found.interference - INTERFERENCE) < 0.06 * np.linalg.norm(INTERFERENCE)
 
 
-def test_a_wrong_motor_compensation_in_force_is_undone_first():
+@pytest.mark.parametrize("later", [0.05, 0.2])
+def test_a_wrong_motor_compensation_in_force_is_undone_first_with_the_lag_it_had(later):
     wrong = {
         "COMPASS_MOTCT": 2.0,
         **ardupilot.correction_parameters(replace(EXACT, motor=np.array([3.0, 2.0, -1.0])), 1, 1.0),
     }
     plain = fit(Flown(seed=2, current_hz=25.0).problem(), "flight")
-    undone = fit(Flown(seed=2, in_force=wrong, current_hz=25.0).problem(), "flight")
+    flown = Flown(seed=2, in_force=wrong, current_hz=25.0, applied_later=later)
+    undone = fit(flown.problem(), "flight")
     difference = np.linalg.norm(undone.interference - plain.interference)
     assert difference < 0.01 * np.linalg.norm(INTERFERENCE)
+    assert undone.lags.applied == pytest.approx(flown.current_lag + later, abs=0.02)
 
 
 def test_the_covariance_of_a_flight_is_what_repetition_shows():
@@ -98,7 +101,7 @@ def test_a_poor_flight_leans_on_the_calibration_in_force(seed):
 
 @pytest.mark.parametrize("compensated", [False, True], ids=["off", "current in force"])
 def test_the_stated_derivatives_are_those_of_the_residuals(compensated):
-    """All twenty: motor, offset, soft iron, strength, dip, both lags, tilt and lean."""
+    """All 23: motor, offset, soft iron, strength, dip, the three lags, tilt and lean."""
     in_force = None
     if compensated:
         wrong = replace(EXACT, motor=np.array([3.0, 2.0, -1.0]))
@@ -118,8 +121,8 @@ def test_the_stated_derivatives_are_those_of_the_residuals(compensated):
             np.full(3, 1e-3),
             np.full(3, 1e-2),
             np.full(6, 1e-5),
-            [1e-2, 1e-5, 0.04, 0.04],
-            np.full(4, 1e-3),
+            [1e-2, 1e-5, 0.04, 0.04, 0.04],
+            np.full(6, 1e-3),
         ]
     )
     inside = slice(10, -10)

@@ -10,6 +10,7 @@ from magcomp.fit.robust import Prior
 from magcomp.fit.wander import (
     STATES,
     Posterior,
+    Reduced,
     Rows,
     Wander,
     likeliest,
@@ -18,6 +19,7 @@ from magcomp.fit.wander import (
     posterior,
     reduced,
     stretches,
+    weighed,
 )
 from magcomp.model import OFFSET, FloatArray
 
@@ -105,11 +107,12 @@ def test_the_covariance_holds_what_repetition_shows():
     for seed in range(8):
         made, _ = drifting(3.0, seed)
 
-        def at(parameters: FloatArray, made: Rows = made) -> Rows:
+        def at(parameters: FloatArray, made: Rows = made) -> Reduced:
             moved = made.values + made.slopes @ parameters
-            return Rows(made.time, moved, made.slopes, made.pulls)
+            return weighed(Rows(made.time, moved, made.slopes, made.pulls))
 
-        found = posterior(at, np.zeros(SIZE), known, lambda _: True)
+        wander = likeliest(at(np.zeros(SIZE)), known, np.zeros(SIZE))
+        found = posterior(at, np.zeros(SIZE), known, lambda _: True, wander)
         far.append(found.parameters[OFFSET] / np.sqrt(np.diag(found.covariance))[OFFSET])
     assert 0.4 < np.sqrt(np.mean(np.square(far))) < 1.6
 
@@ -117,7 +120,8 @@ def test_the_covariance_holds_what_repetition_shows():
 def test_steps_that_lead_to_what_cannot_be_are_no_answer():
     made, _ = drifting(1.0, 1)
     known = Prior(np.zeros(SIZE), np.ones(SIZE))
-    assert posterior(lambda _: made, np.zeros(SIZE), known, lambda _: False) is None
+    part = weighed(made)
+    assert posterior(lambda _: part, np.zeros(SIZE), known, lambda _: False, WANDER) is None
 
 
 def test_a_mixture_leans_on_the_evidence_and_holds_what_lies_apart():

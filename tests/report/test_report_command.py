@@ -14,6 +14,8 @@ from magcomp.cli.app import run
 SWEEP = str(FIXTURES / "sweep_throttle_only.tlog")
 FLIGHT = str(FIXTURES / "flight.tlog")
 
+pytestmark = pytest.mark.usefixtures("fits_once")
+
 
 @pytest.fixture(autouse=True)
 def no_colour(monkeypatch: pytest.MonkeyPatch) -> None:

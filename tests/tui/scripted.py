@@ -55,6 +55,8 @@ class ScriptedSession:
         A parameter it never takes; the write is rolled back then.
     trouble
         Raised by everything that speaks with the vehicle.
+    acts
+        What it shows of what was written, or why that cannot be looked at.
     slow
         A write does not end by itself; ``writing`` is set while it goes on.
     """
@@ -67,6 +69,7 @@ class ScriptedSession:
     closed: bool = False
     manoeuvre: Manoeuvre | None = None
     slow: bool = False
+    acts: str | Exception = ""
     writing: threading.Event = field(default_factory=threading.Event)
     never: threading.Event = field(default_factory=threading.Event)
 
@@ -110,6 +113,11 @@ class ScriptedSession:
         on_event(Outcome(Standing.NEW))
         return Outcome(Standing.NEW)
 
+    def what_acts(self, plan: WritePlan) -> str:
+        if isinstance(self.acts, Exception):
+            raise self.acts
+        return self.acts
+
     def restore_plan(self, backup: Path) -> WritePlan:
         return self.upload_plan(read_parameter_file(backup))
 
@@ -150,7 +158,7 @@ def app(
     usual = {
         "ports": lambda: made.PORTS,
         "open_live": open_live,
-        "simulate": lambda: Simulation("udp:127.0.0.1:14599", lambda: None),
+        "simulate": lambda autopilot: Simulation("udp:127.0.0.1:14599", lambda: None),
         "now": lambda: datetime(2025, 6, 15, 15, 6, 40, tzinfo=UTC),
         "folder": folder / "flights",
     }

@@ -27,7 +27,7 @@ async def tap(pilot, key: str) -> None:
 
 async def test_the_whole_road(tmp_path):
     usual = Services()
-    with live_vehicle.alive("sweep", seed=4, speed=12.0) as flown:
+    with live_vehicle.alive("sweep", seed=4, speed=16.0) as flown:
         before = dict(flown.vehicle.parameters)
         app = scripted.app(tmp_path, flown.address, open_live=usual.open_live)
         async with app.run_test(size=(120, 40)) as pilot:

@@ -17,6 +17,7 @@ from scripted import screen, until
 from textual.color import Color
 
 from magcomp.analysis import Options
+from magcomp.live.guide import Guidance
 from magcomp.live.progress import Bound, HoverBound, hover_bound
 from magcomp.model import Grade, ParameterSet
 from magcomp.report.ascii import is_ascii_only, plain
@@ -26,7 +27,7 @@ from magcomp.tui.fits import difference_deg, fit_rows
 from magcomp.tui.pictures import round_ticks
 from magcomp.tui.themes import SUN
 from magcomp.tui.widgets.bars import bar
-from magcomp.tui.widgets.live_facts import sparkline, trend
+from magcomp.tui.widgets.live_facts import bound_words, sparkline, trend
 from magcomp.tui.work import Writing
 from magcomp.writing.events import Mismatch, Outcome, Reason, RollingBack, Standing, Written
 
@@ -126,11 +127,32 @@ def test_the_hover_is_the_load_of_half_the_flight_without_the_idling():
     watch = HoverBound()
     for load, times in ((0.4, 50), (22.0, 9), (24.0, 10), (40.0, 8)):
         for _ in range(times):
-            watch.look(True, {"current": load}, None)
-    watch.look(False, {"current": 99.0}, made.analysis())
+            watch.look(True, {"current": load}, None, 0.0)
+    watch.look(False, {"current": 99.0}, made.analysis(), 0.0)
     assert watch.bound.u == 24.0
-    watch.look(True, {"current": 24.0}, made.analysis())
+    watch.look(True, {"current": 24.0}, made.analysis(), 0.0)
     assert len(watch.bound.degrees) == 2
+
+
+@pytest.mark.parametrize(
+    ("enough_at_s", "recorded_s", "enough", "words"),
+    [
+        (140.0, 98.0, False, "; about 40 s more"),
+        (140.0, 129.0, False, "; about 10 s more"),
+        (140.0, 139.5, False, "; about 5 s more"),
+        (240.0, 61.0, False, "; about 3 min more"),
+        (140.0, 141.0, False, ""),
+        (140.0, 98.0, True, ""),
+        (None, 98.0, False, ""),
+    ],
+)
+def test_the_bound_says_how_much_longer_until_it_is_enough(enough_at_s, recorded_s, enough, words):
+    live = made.snapshot(
+        bound=Bound(24.0, "current", (2.0, 1.3), enough_at_s),
+        recorded_s=recorded_s,
+        guidance=Guidance("keep flying", 0.5, enough=enough),
+    )
+    assert bound_words(live).endswith(f"at 24 A{words}")
 
 
 @pytest.mark.parametrize(

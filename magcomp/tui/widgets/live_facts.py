@@ -16,6 +16,7 @@ _FIELD_MESSAGES = ("RAW_IMU", "SCALED_IMU", "SCALED_IMU2", "SCALED_IMU3")
 _SPARKS = "▁▂▃▄▅▆▇█"
 _SPARK_CELLS = 12
 _LOOK_BACK = 3
+_TO_FIVES_S, _TO_TENS_S = 20.0, 95.0
 _STEADY = 0.1
 """A bound that changes by less than this share is steady."""
 
@@ -79,15 +80,33 @@ class LiveFacts(Drawn[Facts]):
 
 
 def bound_words(live: LiveSnapshot) -> str:
-    """``at hover at most 1.3° (95 %), falling ▇▅▃▂ at 24 A``; empty before there is a bound."""
+    """``at hover at most 1.3° (95 %), falling ▇▅▃▂ at 24 A; about 40 s more``.
+
+    Empty before there is a bound.
+    """
     if live.bound is None:
         return "" if live.grade is None else "too early for a bound"
     bound = live.bound
     at = words.quantity(bound.u, bound.regressor)
-    return (
-        f"at hover at most {bound.degrees[-1]:.1f}° (95 %), {trend(bound)} "
-        f"{sparkline(bound.degrees)} at {at}"
-    )
+    course = f", {trend(bound)} {sparkline(bound.degrees)}" if len(bound.degrees) > 1 else ""
+    return f"at hover at most {bound.degrees[-1]:.1f}° (95 %){course} at {at}{_more(live, bound)}"
+
+
+def _more(live: LiveSnapshot, bound: Bound) -> str:
+    """How much longer, where it is not enough yet and somebody can tell."""
+    left = 0.0 if bound.enough_at_s is None else bound.enough_at_s - live.recorded_s
+    if left <= 0.0 or live.guidance.enough:
+        return ""
+    return f"; about {about(left)} more"
+
+
+def about(seconds: float) -> str:
+    """A time nobody knows to the second: ``5 s``, ``40 s``, ``3 min``."""
+    if seconds < _TO_FIVES_S:
+        return f"{max(5 * round(seconds / 5), 5)} s"
+    if seconds < _TO_TENS_S:
+        return f"{10 * round(seconds / 10)} s"
+    return f"{round(seconds / 60)} min"
 
 
 def trend(bound: Bound) -> str:
