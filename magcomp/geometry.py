@@ -104,6 +104,34 @@ def body_from_earth(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> FloatA
     return np.asarray(np.swapaxes(level_matrix(roll, pitch), -1, -2) @ level_from_earth)
 
 
+def angles_of(quaternion: ArrayLike) -> FloatArray:
+    """Roll, pitch and yaw of unit quaternions.
+
+    Parameters
+    ----------
+    quaternion
+        From the earth's axes into the body's, w first, shape (n, 4).
+
+    Returns
+    -------
+    FloatArray
+        Radians, shape (n, 3).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from magcomp.geometry import angles_of
+    >>> half = np.radians(30.0) / 2.0
+    >>> np.degrees(angles_of([[np.cos(half), 0.0, 0.0, np.sin(half)]])).round(6).tolist()
+    [[0.0, 0.0, 30.0]]
+    """
+    w, x, y, z = np.asarray(quaternion, dtype=np.float64).T
+    roll = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
+    pitch = np.arcsin(np.clip(2 * (w * y - z * x), -1.0, 1.0))
+    yaw = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+    return np.stack([roll, pitch, yaw], axis=1)
+
+
 def heading(
     field: ArrayLike, roll: ArrayLike, pitch: ArrayLike, declination: float = 0.0
 ) -> FloatArray:

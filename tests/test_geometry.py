@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from magcomp.geometry import (
+    angles_of,
     body_from_earth,
     gravity_direction,
     heading,
@@ -160,3 +161,21 @@ def test_wrapped_angles_are_the_same_angles_within_half_a_turn(angle):
     assert -np.pi <= wrapped < np.pi
     assert np.sin(wrapped) == pytest.approx(np.sin(angle), abs=1e-9)
     assert np.cos(wrapped) == pytest.approx(np.cos(angle), abs=1e-9)
+
+
+def times(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """The product of two quaternions, w first."""
+    w, v = one[0], one[1:]
+    return np.array(
+        [w * other[0] - v @ other[1:], *(w * other[1:] + other[0] * v + np.cross(v, other[1:]))]
+    )
+
+
+@given(roll=rolls, pitch=pitches, yaw=st.floats(-3.1, 3.1))
+def test_the_angles_of_a_quaternion_are_those_it_was_turned_by(roll, pitch, yaw):
+    x, y, z = (
+        np.array([np.cos(angle / 2), *(np.sin(angle / 2) * np.eye(3)[axis])])
+        for axis, angle in enumerate((roll, pitch, yaw))
+    )
+    found = angles_of([times(times(z, y), x)])[0]
+    assert wrap_angle(found - [roll, pitch, yaw]) == pytest.approx(np.zeros(3), abs=1e-6)

@@ -85,7 +85,7 @@ def readings(
     )
     if corrected:
         keep &= _away_from(reported.time, changes)
-    keep &= ~_in_gap(reported.time, recording.attitude.time)
+    keep &= ~in_gap(reported.time, recording.attitude.time)
     keep &= _usable_state(reported.time, recording.armed)
     if not keep.any():
         raise MissingDataError(
@@ -145,7 +145,7 @@ def _unusable(asked: int, all_: int) -> str:
 
 def within(readings: Readings, known: Series) -> Readings:
     """The readings at times where another quantity is known, not interpolated across a gap."""
-    inside = ~_in_gap(readings.time, known.time)
+    inside = ~in_gap(readings.time, known.time)
     return readings if inside.all() else readings.where(inside)
 
 
@@ -189,7 +189,7 @@ def _away_from(time: FloatArray, moments: tuple[float, ...]) -> BoolArray:
     return np.asarray(near > PARAMETER_SETTLE_S)
 
 
-def _in_gap(time: FloatArray, known: FloatArray) -> BoolArray:
+def in_gap(time: FloatArray, known: FloatArray) -> BoolArray:
     """Whether the neighbours in ``known`` stand too far apart to interpolate between.
 
     One value alone is a constant: it holds everywhere.

@@ -102,6 +102,7 @@ class ArduPilot:
     offset_decimals = 2
     corrected_message = None
     corrected_unit = 1.0
+    truth_message = "SIMSTATE"
     storage_s = 1.0  # a queue of writes, each soon, and the memory's lines after it
     motor_test = ArduPilotMotorTest()
     device_ids_describe = "bus, address and type of a sensor, which are alike in vehicles of a kind"

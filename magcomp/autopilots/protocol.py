@@ -116,6 +116,11 @@ class Autopilot(Protocol):
         ...
 
     @property
+    def truth_message(self) -> str:
+        """Telemetry message in which a vehicle that is simulated says how it really stands."""
+        ...
+
+    @property
     def storage_s(self) -> float:
         """Seconds after which a write survives a restart."""
         ...

@@ -118,6 +118,7 @@ class Px4:
     offset_decimals = 4
     corrected_message = "HIGHRES_IMU"
     corrected_unit = MGAUSS
+    truth_message = "HIL_STATE_QUATERNION"
     storage_s = 2.5  # it saves all at once, 0.3 s after a change and not again for 2 s
     motor_test = Px4MotorTest()
     device_ids_describe = "bus, address and type of a sensor, which are alike in vehicles of a kind"

@@ -30,7 +30,7 @@ from magcomp.writing.files import write_parameter_file
 from magcomp.writing.writer import raise_for_failure
 
 _CURRENTS = (0.0, 10.0, 20.0, 30.0, 40.0, 50.0)
-_RATES = {**DEFAULT_RATES, "SIMSTATE": 20.0}
+_TRUTH_HZ = 20.0
 _LOOK_S = 0.1
 _PATIENCE_S = 30.0
 _LANDED_S = 0.5
@@ -46,11 +46,14 @@ class _Bench:
         For its files; gone afterwards.
     seed, speed
         Which vehicle, and how many times faster than real time it lives.
+    autopilot
+        Whose firmware it has.
     """
 
     directory: Path
     seed: int
     speed: float
+    autopilot: str
 
     def path(self, name: str) -> Path:
         return self.directory / name
@@ -66,7 +69,14 @@ class _Bench:
     metavar="X",
     help="How many times faster than real time it flies.",
 )
-def demo(seed: int, speed: float) -> ExitCode:
+@click.option(
+    "--autopilot",
+    type=click.Choice([each.key for each in autopilots.ALL]),
+    default=autopilots.ALL[0].key,
+    show_default=True,
+    help="Whose firmware it has.",
+)
+def demo(seed: int, speed: float, autopilot: str) -> ExitCode:
     """Show the whole job on a simulated vehicle: record, fit, write, verify, and fly once more.
 
     The vehicle is a process of its own, reached over UDP as a real one is. The fit sees only
@@ -74,10 +84,11 @@ def demo(seed: int, speed: float) -> ExitCode:
     """
     status = StatusLine()
     with tempfile.TemporaryDirectory(prefix="magcomp-demo-") as directory:
-        bench = _Bench(Path(directory), seed, speed)
+        bench = _Bench(Path(directory), seed, speed, autopilot)
         _title("a flight")
         _line(
-            f"A simulated copter (seed {seed}) with three compasses, over UDP, {speed:g} times "
+            f"A simulated {autopilots.named(autopilot).title} copter (seed {seed}) with three "
+            f"compasses, over UDP, {speed:g} times "
             "faster than real time."
         )
         recording, analysis, wrote = _calibrated(bench, status)
@@ -94,7 +105,7 @@ def _calibrated(bench: _Bench, status: StatusLine) -> tuple[Recording, Analysis,
     """Record, fit, write, read back."""
     with (
         _vehicle(bench, "--truth", str(bench.path("truth.json"))) as address,
-        _session(address, bench.path("first.tlog")) as session,
+        _session(bench, address, "first.tlog") as session,
     ):
         _fly(session, bench, status)
         with progress() as step:
@@ -135,7 +146,7 @@ def _flown_again(bench: _Bench, status: StatusLine) -> Recording:
     held = bench.path("held.param")
     with (
         _vehicle(bench, "--parameters", str(held)) as address,
-        _session(address, bench.path("second.tlog")) as session,
+        _session(bench, address, "second.tlog") as session,
     ):
         _fly(session, bench, status)
         return session.recording()
@@ -170,8 +181,11 @@ def _fly(session: LiveSession, bench: _Bench, status: StatusLine) -> None:
         raise MissingDataError("The simulated vehicle must fly; instead it did not.")
 
 
-def _session(address: str, record: Path) -> LiveSession:
-    return LiveSession.open(address, record=record, system=1, rates=_RATES, refit_share=0.0)
+def _session(bench: _Bench, address: str, record: str) -> LiveSession:
+    rates = {**DEFAULT_RATES, autopilots.named(bench.autopilot).truth_message: _TRUTH_HZ}
+    return LiveSession.open(
+        address, record=bench.path(record), system=1, rates=rates, refit_share=0.0
+    )
 
 
 @contextlib.contextmanager
@@ -181,7 +195,8 @@ def _vehicle(bench: _Bench, *options: str) -> Iterator[str]:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
     command = [sys.executable, "-m", "magcomp", "simulate", f"udpout:127.0.0.1:{port}"]
-    command += ["--seed", str(bench.seed), "--speed", str(bench.speed), *options]
+    command += ["--seed", str(bench.seed), "--speed", str(bench.speed)]
+    command += ["--autopilot", bench.autopilot, *options]
     with subprocess.Popen(  # noqa: S603 - our own program
         command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
     ) as child:
@@ -244,12 +259,16 @@ def _show_flown(bench: _Bench, before: Recording, after: Recording) -> None:
 
 def _errors(recording: Recording, path: Path) -> Mapping[int, HeadingAccuracy]:
     """Heading as the autopilot's own correction gave it, against the true heading."""
-    truth, values = read_truth(path), recording.parameters.latest
+    truth, autopilot, said = read_truth(path), autopilots.of(recording), recording.parameters
+    # A firmware may store what it learned in the air when it is disarmed.
+    values = {name: said.of(name)[0].value for name in said.names}
     found = {}
     for compass in sorted(recording.field):
-        in_force = autopilots.of(recording).in_force(values, compass)
+        in_force = autopilot.in_force(values, compass)
         made = track(recording, compass, in_force.correction, in_force.regressor)
-        judged = accuracy(truth, made.time, made.reported)
+        raw_is_sent = autopilot.corrected_message is not None
+        heading = made.corrected if raw_is_sent else made.reported
+        judged = accuracy(truth, made.time, heading)
         if judged is None:
             raise MissingDataError("The simulated flight must show its truth; instead it does not.")
         found[compass] = judged

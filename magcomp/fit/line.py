@@ -85,16 +85,17 @@ def paper_line(centres: FloatArray, *, threshold: float = 1e-9, most: int = 20_0
     moved, solution = design, np.full(4, np.inf)
     for _ in range(most):
         normal = moved.T @ moved
-        if np.linalg.cond(normal) > 1 / np.finfo(np.float64).eps:
+        if moved is design and np.linalg.cond(normal) > 1 / np.finfo(np.float64).eps:
             raise InputError(
                 "The paper's line x = a·z + b needs centres at different z; instead all "
                 f"{count} centres lie within {np.ptp(centres[:, 2]):.3g} mGauss of one z"
             )
-        previous, solution = solution, np.asarray(np.linalg.solve(normal, moved.T @ observed))
-        if np.max(np.abs(solution - previous)) <= threshold:
+        previous, solution = solution, np.linalg.solve(normal, moved.T @ observed)
+        if np.abs(solution - previous).max() <= threshold:
             break
-        outer = np.eye(4) + np.outer(solution, solution)
-        moved = np.asarray(np.linalg.solve(outer, design.T + np.outer(solution, observed)).T)
+        # (E + ξξᵀ)⁻¹ = E − ξξᵀ / (1 + ξᵀξ), and so B̂ = B + (L − Bξ)·ξᵀ / (1 + ξᵀξ).
+        share = (observed - design @ solution) / (1.0 + solution @ solution)
+        moved = design + share[:, None] * solution
     a, b, c, d = solution
     direction = np.array([a, c, 1.0])
     return SpaceLine(np.array([b, d, 0.0]), direction / np.linalg.norm(direction))

@@ -207,18 +207,32 @@ def _on_bound(
     tolerable = max(limits.marginal_deg, limits.lesser_evil * worst.before)
     tolerable = min(tolerable, limits.useless_deg)
     if fit.method == "sweep" and _of_motors(errors[0], error_at(errors, fit.u_high)) <= tolerable:
-        yield Finding(
-            Grade.MARGINAL,
-            f"what the motors add is known, but the heading could still be wrong by "
-            f"{worst.p95:.1f}° whatever they do: a vehicle that stands still cannot show whether "
-            "its calibration is right; fly, and turn all the way round",
-        )
+        yield _on_calibration_at_rest(worst, limits)
         return
     grade = Grade.MARGINAL if worst.p95 <= tolerable else Grade.REJECTED
     yield Finding(
         grade,
         f"the heading could still be wrong by {worst.p95:.1f}° at "
         f"{_quantity(fit, worst.u)}: {lacking(fit, samples, covered, worst.u)}",
+    )
+
+
+def _on_calibration_at_rest(worst: HeadingError, limits: Thresholds) -> Finding:
+    """What a sweep leaves open where it knows the motors: hard and soft iron."""
+    known = (
+        "what the motors add is known, but the heading could still be wrong by "
+        f"{worst.p95:.1f}° whatever they do: "
+    )
+    if worst.p95 > limits.useless_deg:
+        return Finding(
+            Grade.REJECTED,
+            f"{known}the calibration in force does not fit the earth's field here, or nobody ever "
+            "made one; calibrate the compass, then sweep again",
+        )
+    return Finding(
+        Grade.MARGINAL,
+        f"{known}a vehicle that stands still cannot show whether its calibration is right; fly, "
+        "and turn all the way round",
     )
 
 

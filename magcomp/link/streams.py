@@ -58,6 +58,7 @@ _GROUPS = {
     "BATTERY_STATUS": mavlink.MAV_DATA_STREAM_EXTRA3,
     # A simulation's truth, which demonstrations compare with; no fit ever sees it.
     "SIMSTATE": mavlink.MAV_DATA_STREAM_EXTRA1,
+    "HIL_STATE_QUATERNION": mavlink.MAV_DATA_STREAM_EXTRA1,
 }
 """ArduPilot's stream groups of the messages that can be asked for."""
 

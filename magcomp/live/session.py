@@ -37,6 +37,7 @@ from magcomp.live.watch import LOOK_S, Watch
 from magcomp.model import Analysis, ParameterSet, Recording, Vehicle
 from magcomp.writing.events import Event, Outcome
 from magcomp.writing.files import is_own
+from magcomp.writing.in_force import in_force_sentence
 from magcomp.writing.plan import WritePlan
 
 _Result = TypeVar("_Result")
@@ -90,7 +91,9 @@ class LiveSession:
         self._stop = threading.Event()
         self._refits = (options, refit_share)
         self._refitter: Refitter | None = None
-        self._watch = Watch(connection, tap, self._preparation, clock, lambda: self.refit)
+        self._watch = Watch(
+            connection, tap, self._preparation, clock, lambda: self.refit, self._hurry
+        )
         self._threads = [
             threading.Thread(target=work, name=f"magcomp-{name}", daemon=True)
             for name, work in (
@@ -339,6 +342,13 @@ class LiveSession:
                 stop=stop,
             )
 
+    def what_acts(self, plan: WritePlan) -> str:
+        """Look whether what was written is in force; see ``in_force_sentence``."""
+        with self._asked:
+            return in_force_sentence(
+                self.connection, plan, self._clock.monotonic, self.connection.requested_rates
+            )
+
     def restore(
         self,
         backup: Path,
@@ -386,6 +396,12 @@ class LiveSession:
             self._refitter = Refitter(self.recording, options, share=share)
 
     # ---------------------------------------------------------------- inside
+
+    def _hurry(self) -> bool:
+        if self._refitter is None or not self._tap.taking:
+            return False
+        self._refitter.hurry()
+        return True
 
     def _known_vehicle(self) -> Vehicle:
         vehicle = self.connection.vehicle

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from magcomp.autopilots.px4_correction import Compensation, stored
+from magcomp.geometry import angles_of
 from magcomp.model import BoolArray, FloatArray, Series
 from magcomp.sources.ulog_file import MICROSECOND, Topic, UlogFile
 
@@ -59,11 +60,7 @@ class Quantities:
         q = topic.vector("q", 4)
         length = np.linalg.norm(q, axis=1)
         sound = np.isfinite(length) & (length > 0.5) & (length < 2.0)
-        w, x, y, z = (q[sound] / length[sound, None]).T
-        roll = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
-        pitch = np.arcsin(np.clip(2 * (w * y - z * x), -1.0, 1.0))
-        yaw = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-        return _series(self._time(topic)[sound], np.stack([roll, pitch, yaw], axis=1))
+        return _series(self._time(topic)[sound], angles_of(q[sound] / length[sound, None]))
 
     def gyro(self) -> Series | None:
         """Body rates in rad/s."""

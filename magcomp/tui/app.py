@@ -18,6 +18,7 @@ from magcomp.errors import MagcompError, UsageError
 from magcomp.model import Grade
 from magcomp.tui import fitting, opening, status, sweeping, verifying, writing
 from magcomp.tui.base import BaseApp
+from magcomp.tui.choices import SIMULATED
 from magcomp.tui.help_text import help_text, key_lines
 from magcomp.tui.messages import (
     CompassToggled,
@@ -183,9 +184,9 @@ class MagcompApp(BaseApp):
         """Ask for a log."""
         opening.ask_log(self)
 
-    def action_simulate(self) -> None:
+    def action_simulate(self, autopilot: str = "") -> None:
         """Connect to a simulated vehicle."""
-        opening.simulate(self)
+        opening.simulate(self, autopilot or next(iter(SIMULATED.values())))
 
     def action_disconnect(self) -> None:
         """Close vehicle or log."""
@@ -272,8 +273,11 @@ class MagcompApp(BaseApp):
 
     def get_system_commands(self, screen: Screen[Any]) -> Iterable[SystemCommand]:
         """Everything a key does, by name, and what needs no key."""
-        yield SystemCommand("Open a log", "A .tlog of a flight", self.action_open_log)
-        yield SystemCommand("Simulated vehicle", "Try everything", self.action_simulate)
+        yield SystemCommand("Open a log", "A .tlog, .BIN or .ulg", self.action_open_log)
+        for name, autopilot in SIMULATED.items():
+            yield SystemCommand(
+                f"Try a {name}", "Nothing can break", lambda a=autopilot: self.action_simulate(a)
+            )
         yield SystemCommand("Disconnect", "Close vehicle or log", self.action_disconnect)
         for step, title in STEPS.items():
             yield SystemCommand(

@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from magcomp import autopilots
 from magcomp.link import SerialPort
 
-SIMULATED = "simulated vehicle"
+SIMULATED = {f"simulated {each.title} vehicle": each.key for each in autopilots.ALL}
+"""What is chosen, and whose firmware it has."""
+
 LISTEN = "udp:0.0.0.0:14550"
 
 
@@ -18,7 +21,7 @@ class Choice:
     Attributes
     ----------
     target
-        Address or path, or `SIMULATED`.
+        Address or path, or one of `SIMULATED`.
     note
         What it is.
     """
@@ -35,5 +38,5 @@ def choices(ports: Iterable[SerialPort], recent: Sequence[str]) -> tuple[Choice,
         *listed,
         *(Choice(name, "used lately") for name in recent if name not in known),
         Choice(LISTEN, "listen for whoever sends here"),
-        Choice(SIMULATED, "to try everything; nothing can break"),
+        *(Choice(name, "to try everything; nothing can break") for name in SIMULATED),
     )

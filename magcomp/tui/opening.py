@@ -69,7 +69,7 @@ def open_target(app: BaseApp, target: str) -> None:
         _when_free(app, lambda: _connect(app, target))
 
 
-def simulate(app: BaseApp) -> None:
+def simulate(app: BaseApp, autopilot: str) -> None:
     """Start a simulated vehicle and connect to it."""
 
     def started(simulation: Simulation) -> None:
@@ -79,7 +79,7 @@ def simulate(app: BaseApp) -> None:
     _when_free(
         app,
         lambda: app.run_task(
-            "starting the simulated vehicle", lambda _: app.services.simulate(), started
+            "starting the simulated vehicle", lambda _: app.services.simulate(autopilot), started
         ),
     )
 

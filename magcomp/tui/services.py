@@ -78,6 +78,10 @@ class Session(Protocol):
         """Write and verify, or put everything back."""
         ...
 
+    def what_acts(self, plan: WritePlan) -> str:
+        """Whether what was written is in force, a sentence; empty where nothing shows it."""
+        ...
+
     def restore_plan(self, backup: Path) -> WritePlan:
         """Compare the vehicle with a backup."""
         ...
@@ -131,8 +135,13 @@ def open_live(
     return LiveSession.open(address, record=record, system=system, component=component)
 
 
-def simulate() -> Simulation:
+def simulate(autopilot: str) -> Simulation:
     """Start a simulated vehicle on this computer.
+
+    Parameters
+    ----------
+    autopilot
+        Whose firmware it has, as in ``Vehicle.autopilot``.
 
     Raises
     ------
@@ -145,7 +154,7 @@ def simulate() -> Simulation:
     stop = threading.Event()
     ready: queue.Queue[str | Exception] = queue.Queue()
 
-    vehicle = Vehicle(scenario("flight", seed=7), wait_for_ground=True)
+    vehicle = Vehicle(scenario("flight", seed=7), wait_for_ground=True, autopilot=autopilot)
 
     def live() -> None:
         try:
@@ -191,7 +200,7 @@ class Services:
     open_live
         A session with the vehicle at an address, that records into a file.
     simulate
-        Starts a simulated vehicle.
+        Starts a simulated vehicle of an autopilot.
     make_ready, sweep
         Look whether a vehicle's motors can be spun on the ground, and spin them.
     now
@@ -203,7 +212,7 @@ class Services:
     ports: Callable[[], Sequence[SerialPort]] = serial_ports
     read: Callable[[Path, int | None], Recording] = read_log
     open_live: Callable[[str, Path, int | None], Session] = open_live
-    simulate: Callable[[], Simulation] = simulate
+    simulate: Callable[[str], Simulation] = simulate
     make_ready: Callable[[Session, int | None, float], Bench] = make_ready
     sweep: Callable[[Session, Bench, str, Pressed, SweepTold], SweepOutcome] = sweep
     now: Callable[[], datetime] = _now

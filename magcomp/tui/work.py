@@ -115,6 +115,8 @@ class Writing:
         Where the old values go, or went; None for a log.
     result
         How it ended; empty before.
+    acts
+        Whether what was written is in force, where the vehicle shows it; else empty.
     before, in_force
         What the vehicle held before it was written, and what it holds since; empty where it was
         not written.
@@ -130,6 +132,7 @@ class Writing:
     warnings: tuple[str, ...] = ()
     backup: Path | None = None
     result: str = ""
+    acts: str = ""
     before: Mapping[str, float] = field(default_factory=dict)
     in_force: Mapping[str, float] = field(default_factory=dict)
     promised: Analysis | None = None

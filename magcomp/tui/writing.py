@@ -14,7 +14,7 @@ from magcomp.report.files import SUFFIXES as REPORT_SUFFIXES
 from magcomp.tui.base import BaseApp
 from magcomp.tui.changes import ChangeRow, after_event, change_rows, left_out_warnings
 from magcomp.tui.screens.dialogs import AskText, Confirm, Message
-from magcomp.tui.services import Progress, save_report
+from magcomp.tui.services import Progress, Session, save_report
 from magcomp.tui.status import WRITING
 from magcomp.tui.work import Work, Writing
 from magcomp.writing.events import Event, Outcome
@@ -197,13 +197,15 @@ def _write(app: BaseApp, plan: WritePlan, backup: Path) -> None:
     if session is None:
         return
 
-    def task(progress: Progress) -> tuple[Outcome, float]:
+    def task(progress: Progress) -> tuple[Outcome, str, float]:
         backup.parent.mkdir(parents=True, exist_ok=True)
         outcome = session.upload(plan, backup, _follow(app, progress), app.stopping.is_set)
-        return outcome, session.recording().duration_s if outcome.good else 0.0
+        if not outcome.good:
+            return outcome, "", 0.0
+        return outcome, _what_acts(session, plan), session.recording().duration_s
 
-    def then(ended: tuple[Outcome, float]) -> None:
-        outcome, since_s = ended
+    def then(ended: tuple[Outcome, str, float]) -> None:
+        outcome, acts, since_s = ended
         app.note_file("Backup", backup)
         app.writing = replace(app.writing, backup=backup)
         if _ended(app, outcome, backup):
@@ -211,6 +213,7 @@ def _write(app: BaseApp, plan: WritePlan, backup: Path) -> None:
             app.writing = replace(
                 app.writing,
                 result=f"all {len(app.writing.rows)} parameters read back as written",
+                acts=acts,
                 before=plan.old,
                 in_force=now,
                 promised=app.work.analysis,
@@ -221,6 +224,14 @@ def _write(app: BaseApp, plan: WritePlan, backup: Path) -> None:
             app.set_work(replace(app.work, kept="the vehicle"))
 
     app.run_task(WRITING, task, then)
+
+
+def _what_acts(session: Session, plan: WritePlan) -> str:
+    """What the vehicle shows of it: that it cannot be looked at is no failure of the write."""
+    try:
+        return session.what_acts(plan)
+    except MagcompError as error:
+        return f"what is in force could not be looked at: {str(error).rstrip('.')}"
 
 
 def _follow(app: BaseApp, progress: Progress) -> Callable[[Event], None]:

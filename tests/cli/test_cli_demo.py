@@ -10,9 +10,12 @@ from magcomp.cli.app import run
 
 
 @pytest.mark.slow
-def test_the_demo_leaves_the_heading_right_by_the_truth_and_in_flight(capsys, monkeypatch):
+@pytest.mark.parametrize("autopilot", ["ardupilot", "px4"])
+def test_the_demo_leaves_the_heading_right_by_the_truth_and_in_flight(
+    capsys, monkeypatch, autopilot
+):
     monkeypatch.setenv("COLUMNS", "80")
-    assert run(["demo", "--seed", "6", "--speed", "30"]) == 0
+    assert run(["demo", "--seed", "6", "--speed", "30", "--autopilot", autopilot]) == 0
     out = capsys.readouterr().out
     assert re.search(r"\d+ parameters written while disarmed, each read back", out)
     truth = out[out.index("the truth ─") :]

@@ -65,6 +65,13 @@ def test_the_bound_is_good_marginal_the_lesser_evil_or_useless(monkeypatch, p95,
     assert grade(judging._on_bound(fit(), table, table[-1], (None, covered()), LIMITS)) is expected
 
 
+@pytest.mark.parametrize(("at_rest", "expected"), [(19.9, MARGINAL), (20.1, REJECTED)])
+def test_a_sweep_that_knows_the_motors_is_useless_without_a_calibration(at_rest, expected):
+    table = errors(30.0, at_rest)
+    swept = judging._on_bound(fit("sweep"), table, table[-1], (None, covered()), LIMITS)
+    assert grade(swept) is expected
+
+
 @pytest.mark.parametrize(
     ("held_out", "expected"), [(94.0, GOOD), (96.0, MARGINAL), (101.0, REJECTED)]
 )

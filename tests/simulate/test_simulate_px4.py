@@ -14,12 +14,16 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from magcomp.autopilots.px4_correction import correct, stored
 from magcomp.autopilots.px4_rotation import sensor_to_body
 from magcomp.mavlink.header import payload
+from magcomp.mavlink.messages import WANTED
 from magcomp.mavlink.parameters import decode_param_value
 from magcomp.mavlink.parameters import encoding as encoding_of
+from magcomp.mavlink.records import record as record_of
 from magcomp.mavlink.splitter import Splitter
 from magcomp.simulate import Vehicle, record, scenario
 from magcomp.simulate.ground import PX4_RATES, Asker
 from magcomp.simulate.px4.streams import DEFAULT_RATES, ON_REQUEST
+from magcomp.sources import read
+from magcomp.sources.truth import read_truth
 
 FIXTURES = Path(__file__).parents[2] / "sitl_fixtures"
 ASKED_AT_S = 20.0
@@ -177,3 +181,20 @@ def test_the_third_compass_is_turned_as_in_the_recording(simulated):
     values = {p.name: p.value for p in simulated[1].parameters}
     assert values["CAL_MAG2_ROT"] == 10.0
     assert sensor_to_body(values, 3) @ np.array([1.0, 2.0, 3.0]) == pytest.approx([2.0, 1.0, -3.0])
+
+
+def test_asked_for_the_truth_it_says_how_it_really_stands_and_no_fit_sees_it(tmp_path):
+    rates = {mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION: 20.0}
+    vehicle = Vehicle(scenario("flight", 3), autopilot="px4", start_unix_s=1.7e9)
+    path = tmp_path / "px4.tlog"
+    frames = record(vehicle, seconds=30.0, rates=rates)
+    path.write_bytes(b"".join(record_of(int((1.7e9 + f.time) * 1e6), f.data) for f in frames))
+    truth, recording = read_truth(path), read(path)
+    for axis in range(2):
+        believed = recording.attitude.value[:, axis]
+        said = np.interp(truth.attitude.time, recording.attitude.time, believed)
+        error = said - truth.attitude.value[:, axis]
+        assert np.degrees(np.median(np.abs(error))) < 0.5 < np.degrees(np.ptp(said))
+    here = recording.position.value.mean(axis=0)[:2]
+    assert truth.position.value.mean(axis=0) == pytest.approx(here, abs=1e-3)
+    assert mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION not in WANTED

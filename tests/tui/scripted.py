@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import re
 import threading
 import time
@@ -55,6 +56,8 @@ class ScriptedSession:
         A parameter it never takes; the write is rolled back then.
     trouble
         Raised by everything that speaks with the vehicle.
+    acts
+        What it shows of what was written, or why that cannot be looked at.
     slow
         A write does not end by itself; ``writing`` is set while it goes on.
     """
@@ -67,6 +70,7 @@ class ScriptedSession:
     closed: bool = False
     manoeuvre: Manoeuvre | None = None
     slow: bool = False
+    acts: str | Exception = ""
     writing: threading.Event = field(default_factory=threading.Event)
     never: threading.Event = field(default_factory=threading.Event)
 
@@ -110,6 +114,11 @@ class ScriptedSession:
         on_event(Outcome(Standing.NEW))
         return Outcome(Standing.NEW)
 
+    def what_acts(self, plan: WritePlan) -> str:
+        if isinstance(self.acts, Exception):
+            raise self.acts
+        return self.acts
+
     def restore_plan(self, backup: Path) -> WritePlan:
         return self.upload_plan(read_parameter_file(backup))
 
@@ -150,7 +159,7 @@ def app(
     usual = {
         "ports": lambda: made.PORTS,
         "open_live": open_live,
-        "simulate": lambda: Simulation("udp:127.0.0.1:14599", lambda: None),
+        "simulate": lambda autopilot: Simulation("udp:127.0.0.1:14599", lambda: None),
         "now": lambda: datetime(2025, 6, 15, 15, 6, 40, tzinfo=UTC),
         "folder": folder / "flights",
     }
@@ -163,13 +172,17 @@ def app(
     )
 
 
-async def until(pilot: Any, true: Callable[[], object], *, idle: bool = True) -> None:
+async def until(
+    pilot: Any, true: Callable[[], object], *, idle: bool = True, look_s: float = 0.01
+) -> None:
     """Let the app work until a condition holds, and then until there is nothing more to do."""
     deadline = time.monotonic() + PATIENCE_S
     while not true():
         if time.monotonic() > deadline:
             raise TimeoutError(f"the condition never held; the screen says:\n{picture(pilot.app)}")
-        await pilot.pause(0.01)
+        if pilot.app._exception is not None:
+            raise pilot.app._exception
+        await asyncio.sleep(look_s)
     if idle:
         await pilot.pause()
 

@@ -22,6 +22,7 @@ from magcomp.fit import METHODS
 from magcomp.tui import fitting
 from magcomp.tui.fits import fit_rows
 from magcomp.tui.screens.dialogs import Confirm, Message
+from magcomp.tui.services import Simulation
 from magcomp.writing.files import read_parameter_file
 
 SWEEP = FIXTURES / "sweep_current.tlog"
@@ -260,11 +261,32 @@ async def test_what_cannot_be_opened_gets_a_sentence_and_a_next_step(tmp_path, t
         assert not pilot.app.work.source
 
 
-async def test_logs_used_lately_are_offered_next_time(tmp_path):
-    async with scripted.app(tmp_path, str(SWEEP)).run_test() as pilot:
-        await opened(pilot)
+async def test_logs_used_lately_are_offered_next_time_whatever_wrote_them(tmp_path):
+    logs = (str(SWEEP), str(tmp_path / "flight.BIN"), str(tmp_path / "px4.ulg"))
+    for log in logs:
+        Path(log).touch()
+        services = {"read": lambda *_: made.recording()}
+        async with scripted.app(tmp_path, log, **services).run_test() as pilot:
+            await opened(pilot)
     later = scripted.app(tmp_path)
     async with later.run_test(size=(120, 40)) as pilot:
         await until(pilot, lambda: later.choices)
-        assert str(SWEEP) in {choice.target for choice in later.choices}
-        assert Path(SWEEP).name in screen(later)
+        for log in logs:
+            assert log in {choice.target for choice in later.choices}
+            assert Path(log).name in screen(later)
+
+
+async def test_either_simulated_vehicle_can_be_chosen_from_the_list(tmp_path):
+    for down, autopilot in ((2, "ardupilot"), (1, "px4")):
+        started = []
+
+        def simulate(name, started=started):
+            started.append(name)
+            return Simulation("udp:127.0.0.1:14599", lambda: None)
+
+        app = scripted.app(tmp_path, simulate=simulate)
+        async with app.run_test() as pilot:
+            await until(pilot, lambda app=app: app.choices)
+            await press(pilot, "end", *["up"] * (down - 1), "enter")
+            await until(pilot, lambda started=started: started)
+        assert started == [autopilot]

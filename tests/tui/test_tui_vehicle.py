@@ -306,6 +306,31 @@ async def test_writing_asks_backs_up_shows_each_parameter_and_can_be_undone(tmp_
         assert not pilot.app.work.kept
 
 
+async def test_what_the_vehicle_shows_of_a_write_is_said_after_it_and_while_verifying(tmp_path):
+    session = disarmed()
+    session.acts = "PX4 corrects its compass by what was written: within 1.4 mGauss"
+    app = scripted.app(tmp_path, session=session)
+    async with app.run_test(size=(120, 40)) as pilot:
+        await fitted(pilot)
+        await press(pilot, "w", "y")
+        await until(pilot, lambda: app.work.kept)
+        assert f"{session.acts}." in screen(app)
+        await press(pilot, "n")
+        await until(pilot, lambda: f"{session.acts}." in screen(app))
+        assert "worked out from the backup" in screen(app)
+
+
+async def test_a_written_vehicle_that_cannot_be_looked_at_is_written_all_the_same(tmp_path):
+    session = disarmed()
+    session.acts = LinkTimeoutError("The vehicle does not answer.")
+    app = scripted.app(tmp_path, session=session)
+    async with app.run_test(size=(120, 40)) as pilot:
+        await fitted(pilot)
+        await press(pilot, "w", "y")
+        await until(pilot, lambda: app.work.kept == "the vehicle")
+        assert "could not be looked at" in screen(app)
+
+
 async def test_the_safe_answer_writes_nothing(tmp_path):
     session = disarmed()
     before = dict(session.held)

@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from magcomp.simulate.flight import GRAVITY
+from magcomp.simulate.motion import euler
 from magcomp.simulate.shared_telemetry import (
     ABSENT_VOLTAGE,
     BUILDERS,
@@ -161,6 +163,25 @@ def _attitude_target(view: View) -> Any:
     )
 
 
+def _hil_state_quaternion(view: View) -> Any:
+    """The truth, as a PX4 in a simulator sends it (stream HIL_STATE_QUATERNION)."""
+    turn = _quaternion(*euler(view.block.motion.earth_from_body[view.step]).tolist())
+    latitude, longitude, altitude = view.geodetic()
+    speed = cut(np.array([100.0 * np.linalg.norm(view.velocity)]))[0]
+    return mavlink.MAVLink_hil_state_quaternion_message(
+        view.boot_us,
+        turn,
+        *view.block.rates[view.step].tolist(),
+        latitude,
+        longitude,
+        round(altitude * 1e3),
+        *cut(view.velocity * 100.0),
+        speed,
+        speed,
+        *cut(view.block.force[view.step] * 1000.0 / GRAVITY),
+    )
+
+
 def _outputs(view: View) -> list[float]:
     if not view.armed:
         return [float(_DISARMED_US)] * _OUTPUTS
@@ -290,6 +311,7 @@ _BUILDERS: Mapping[int, Callable[[View], Any]] = {
     mavlink.MAVLINK_MSG_ID_HIGHRES_IMU: _highres_imu,
     mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: _attitude_quaternion,
     mavlink.MAVLINK_MSG_ID_ATTITUDE_TARGET: _attitude_target,
+    mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION: _hil_state_quaternion,
     mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: _servo_output_raw,
     mavlink.MAVLINK_MSG_ID_ACTUATOR_OUTPUT_STATUS: _actuator_output_status,
     mavlink.MAVLINK_MSG_ID_VFR_HUD: _vfr_hud,

@@ -33,7 +33,7 @@ class TargetList(OptionList):
 - *udp:0.0.0.0:14550* listens for a vehicle, simulator or ground station that sends to this
   computer; *tcp:HOST:PORT* connects to one.
 - A *log* is a .tlog, .BIN or .ulg file: everything but writing works without a vehicle.
-- The *simulated vehicle* needs nothing and can break nothing.
+- A *simulated vehicle* needs nothing and can break nothing.
 """
 
 
@@ -174,8 +174,8 @@ class ConnectScreen(StepScreen):
     async def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
         """Connect to a line of the list."""
         target = event.option_id or ""
-        if target == SIMULATED:
-            await self.run_action("app.simulate")
+        if target in SIMULATED:
+            await self.run_action(f"app.simulate('{SIMULATED[target]}')")
         elif target:
             self.post_message(TargetChosen(target))
 

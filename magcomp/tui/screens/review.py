@@ -124,6 +124,8 @@ class ReviewScreen(StepScreen):
             lines.append(Content.assemble((" Backup: ", "$quiet"), str(writing.backup)))
         if writing.result:
             lines.append(Content.assemble((" Result: ", "bold"), words.sentence(writing.result)))
+        if writing.acts:
+            lines.append(Content.assemble((" Seen: ", "bold"), words.sentence(writing.acts)))
         return Content("\n").join(lines)
 
     def _next(self) -> str:

@@ -12,6 +12,7 @@ from textual.widget import Widget
 from textual.widgets import Static
 
 from magcomp.live.situation import Situation
+from magcomp.report import words
 from magcomp.tui.before_after import HeadingPair, HeadingWatch, heading_pairs
 from magcomp.tui.screens.step import StepScreen
 from magcomp.tui.state import State
@@ -91,7 +92,7 @@ class VerifyScreen(StepScreen):
         if live is not None and live.armed and live.situation is Situation.FLYING:
             return "Hold a heading, climb and descend: “takes out” grows with the throttle."
         if writing.measured:
-            return "Done: Q ends and says where your files are. Or fly again to measure again."
+            return "Done: Q ends and says where your files are. Fly on to measure again."
         if writing.in_force and not self._watch.marked:
             return "Fly as before and land: it is then measured. On the ground: M, see F1."
         if not self._watch.marked:
@@ -125,6 +126,8 @@ def state_lines(state: State) -> tuple[str, ...]:
         return tuple(promise.sentence for promise in writing.measured)
     if writing.measured_trouble:
         return (writing.measured_trouble,)
+    if writing.acts:
+        return (words.sentence(writing.acts), "“Before” is worked out from the backup.")
     if writing.in_force:
         return ("The new parameters are in force; “before” is worked out from the backup.",)
     if state.work.analysis is not None:
