@@ -8,6 +8,10 @@ BIN    := $(VENV)/bin
 demo: $(VENV)/installed
 	@$(BIN)/magcomp demo
 
+# Tests start many programs, and each would compile anew what an environment forbids to keep.
+test tests-only test-all coverage: export PYTHONDONTWRITEBYTECODE :=
+test tests-only test-all coverage: export PYTHONPYCACHEPREFIX := $(CURDIR)/$(VENV)/compiled
+
 # All but what waits or computes for tens of seconds; `make test-all` has that too, and looks
 # five times as long for what breaks a parser or a protocol.
 # The linters run beside the tests, in the time in which those wait for each other.

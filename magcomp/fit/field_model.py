@@ -20,6 +20,7 @@ from magcomp.model import (
     Lags,
     MotorFit,
     Samples,
+    median,
     pack,
     unpack,
 )
@@ -194,8 +195,8 @@ def _leaning(samples: Samples) -> list[FloatArray]:
     """
     if len(samples) < 2:
         return [np.zeros((2, len(samples))) for _ in LEANS_S]
-    step = max(float(np.median(np.diff(samples.time))), 1e-3)
-    tilt = samples.attitude[:, :2] - np.median(samples.attitude[:, :2], axis=0)
+    step = max(float(median(np.diff(samples.time))), 1e-3)
+    tilt = samples.attitude[:, :2] - median(samples.attitude[:, :2])
     return [low_pass(tilt, step / (each + step)).T for each in LEANS_S]
 
 

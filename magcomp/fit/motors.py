@@ -2,7 +2,7 @@
 
 Least squares gives each motor a vector of its own, however little the motors ever differed in
 what they draw. What a flight does not show is better taken as alike: the differences get a prior
-around nothing whose width is the likeliest (docs/method.md, Motor by motor).
+around nothing, of a width that the flight tells (docs/method.md, Motor by motor).
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 
 from magcomp.fit.field_model import SIZE
 from magcomp.fit.robust import Estimate
+from magcomp.fit.wander import Rows, starts_of, weights_and_rest
 from magcomp.model import MOTOR, FloatArray
 
 _WIDTHS = np.concatenate([[0.0], np.geomspace(0.01, 100.0, 41)])
@@ -22,10 +23,7 @@ _WIDTHS = np.concatenate([[0.0], np.geomspace(0.01, 100.0, 41)])
 _SMALL = 1e-6
 """Of the differences' own variance: keeps the matrix from being singular at no width."""
 
-_WHITE = 1.5
-"""Mean square by which the mean of its neighbours misses a row of noise, of the noise's own."""
-
-_LEAST_ROWS = 3
+_TINY = 1e-30
 
 Found = TypeVar("Found", bound=Estimate)
 
@@ -55,66 +53,83 @@ def differences_of(size: int) -> FloatArray:
     return made
 
 
-def blur(parts: FloatArray) -> float:
-    """Share of the differences between motors that is lost between two rows, 0 … 1.
+def shared_error(rows: Rows, tell: FloatArray) -> float:
+    """How much less than readings of their own the readings of a second say of the differences.
 
     Parameters
     ----------
-    parts
-        What each motor draws, at the times it is told, shape (n, k).
+    rows
+        Readings at the solution, with residuals of independent errors.
+    tell
+        From :func:`differences_of`.
+
+    Returns
+    -------
+    float
+        By what the variance of the differences is larger than of independent readings, 1 or more.
 
     Notes
     -----
-    By how well a row is told by its neighbours: not at all where the outputs are told more seldom
-    than the motors change. Then the differences come out too small by an unknown share.
-
-    Examples
-    --------
-    >>> slow, fast = np.sin(np.arange(100.0) / 20), np.array([1.0, -1.0] * 50)
-    >>> blur(np.column_stack([slow, -slow])) < 1e-4, blur(np.column_stack([fast, -fast]))
-    (True, 1.0)
+    What a motor draws between two of its outputs is not told, and lasts longer than a reading: its
+    neighbours err alike. So the square of the sum of their scores is compared with the sum of
+    their squares. What lasts for longer than a second is a state of its own.
     """
-    if len(parts) < _LEAST_ROWS:
-        return 1.0
-    apart = parts - parts.mean(axis=1, keepdims=True)
-    told = apart[1:-1] - (apart[:-2] + apart[2:]) / 2.0
-    whole = float(np.mean((apart - apart.mean(axis=0)) ** 2))
-    return min(1.0, (float(np.mean(told**2)) / (_WHITE * whole)) ** 2) if whole > 0.0 else 1.0
+    weights, left = weights_and_rest(rows.time, rows.values)
+    scores = np.einsum("ngi,ng->ni", rows.slopes @ tell.T, weights * left)
+    together = np.add.reduceat(scores, starts_of(rows.time), axis=0)
+    apart = np.sum(scores**2, axis=0)
+    return max(1.0, float(np.mean(np.sum(together**2, axis=0) / np.maximum(apart, _TINY))))
 
 
-def alike_where_unseen(found: Found, lost: float = 0.0) -> Found:
-    """The estimate with a prior that motors disturb alike, as wide as makes it likeliest.
+def told_together(found: Found, rows: Rows) -> Found:
+    """The estimate with the differences less certain by what neighbouring readings err alike."""
+    tell = differences_of(len(found.parameters))
+    # Along the differences alone: the directions that all readings tell have their blocks of time.
+    stretch = np.eye(len(found.parameters))
+    stretch += (np.sqrt(shared_error(rows, tell)) - 1.0) * tell.T @ tell
+    return replace(found, covariance=stretch @ found.covariance @ stretch.T)
+
+
+def alike_where_unseen(found: Found, unsure: float = 0.0) -> Found:
+    """The estimate with a prior that motors disturb alike, of every width that may be.
 
     Parameters
     ----------
     found
         Made without such a prior; its parameters end with the other motors' vectors.
-    lost
-        From :func:`blur`: the covariance is wider by this share of the differences.
+    unsure
+        As :class:`magcomp.model.Control` has it.
 
     Notes
     -----
-    The differences d = A·p are taken as 0 ± τ: a Kalman update of parameters and covariance. τ
-    maximises the density of the d that was found, N(0, A·C·Aᵀ + τ²).
+    The differences d = A·p are taken as 0 ± τ: a Kalman update of parameters and covariance. Each τ
+    counts by the density it gives the d that was found, N(0, A·C·Aᵀ + τ²), and the covariance
+    holds how far the answers of one τ and another lie apart.
     """
     tell = differences_of(len(found.parameters))
     apart, doubt = tell @ found.parameters, tell @ found.covariance @ tell.T
     usual = float(np.sqrt(np.median(np.diag(doubt))))
     if not usual > 0.0:
         return found
+    gain_of = found.covariance @ tell.T
     identity = np.eye(len(apart))
-
-    def unlikely(width: float) -> float:
+    density, moves, gains = [], [], []
+    for width in _WIDTHS * usual:
         whole = doubt + (width**2 + _SMALL * usual**2) * identity
-        return float(apart @ np.linalg.solve(whole, apart) + np.linalg.slogdet(whole)[1])
-
-    width = min(_WIDTHS * usual, key=unlikely)
-    whole = doubt + (width**2 + _SMALL * usual**2) * identity
-    gain = found.covariance @ tell.T @ np.linalg.inv(whole)
+        gain = np.linalg.solve(whole, gain_of.T).T
+        moves.append(gain @ apart)
+        gains.append(gain @ gain_of.T)
+        density.append(-0.5 * float(apart @ np.linalg.solve(whole, apart)))
+        density[-1] -= 0.5 * float(np.linalg.slogdet(whole)[1])
+    weights = np.exp(np.array(density) - max(density))
+    weights /= weights.sum()
+    move = weights @ np.array(moves)
+    off = np.array(moves) - move
     return replace(
         found,
-        parameters=found.parameters - gain @ apart,
+        parameters=found.parameters - move,
         covariance=found.covariance
-        - gain @ tell @ found.covariance
-        + lost**2 * float(np.mean(apart**2)) * tell.T @ tell,
+        - np.tensordot(weights, np.array(gains), 1)
+        + (off * weights[:, None]).T @ off
+        + unsure**2 * float(np.mean(apart**2)) * tell.T @ tell,
     )

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from magcomp.model import BoolArray, FloatArray, IntArray
+from magcomp.model import BoolArray, FloatArray, IntArray, median
 
 ROUNDS = 6
 """σ is re-estimated this often at most."""
@@ -210,7 +210,7 @@ def spread_of(values: FloatArray, floor: float = NOISE_FLOOR) -> FloatArray:
     >>> spread_of(np.array([[-1.0], [1.0], [-1.0], [1.0], [500.0]]), 0.1).round(4).tolist()
     [1.4826]
     """
-    return np.maximum(_MAD_TO_STD * np.median(np.abs(values), axis=0), floor)
+    return np.maximum(_MAD_TO_STD * median(np.abs(values)), floor)
 
 
 def _weights(z: FloatArray) -> FloatArray:
@@ -309,7 +309,7 @@ def recorded_time(time: FloatArray) -> FloatArray:
     steps = np.diff(time)
     if not len(steps):
         return np.zeros(len(time))
-    longest = max(_GAP_S, _GAP_STEPS * float(np.median(steps)))
+    longest = max(_GAP_S, _GAP_STEPS * float(median(steps)))
     return np.concatenate([[0.0], np.cumsum(np.minimum(steps, longest))])
 
 

@@ -12,7 +12,9 @@ from unequal import VECTORS, Unequal
 
 from magcomp.align import controls, currents_of_motors, readings, to_undo
 from magcomp.fit import Problem, best_form, fit
-from magcomp.fit.motors import contrasts
+from magcomp.fit.field_model import parameters_of
+from magcomp.fit.flight import rows_at
+from magcomp.fit.motors import contrasts, differences_of, shared_error
 from magcomp.judge import judge
 from magcomp.judge.forms import forms, left_deg
 from magcomp.model import CURRENT, Lags
@@ -133,3 +135,26 @@ def test_motors_that_the_flight_does_not_tell_apart_are_taken_as_alike():
     spread = np.ptp(found.correction.motor, axis=1).max()
     assert doubt > 0.2
     assert spread < 0.5 * doubt
+
+
+def test_a_difference_that_the_flight_does_not_show_is_not_known_to_be_nothing():
+    problem = problem_of(Unequal(seed=1), motors=True)
+    alike = problem.control.series.value.copy()
+    # Motors 1 and 2 always draw the same: what each adds cannot be known.
+    alike[:, :2] = alike[:, :2].mean(axis=1, keepdims=True)
+    series = replace(problem.control.series, value=alike)
+    found = fit(replace(problem, control=replace(problem.control, series=series)))
+    assert np.sqrt(np.diag(found.told_apart)).max() > 20.0
+
+
+def test_readings_that_err_alike_for_a_while_say_less_of_the_differences():
+    problem, found = fitted(1)
+    parameters = parameters_of(found, found.lags)
+    rows = rows_at(problem, parameters, None)
+    tell = differences_of(len(parameters))
+    rng = np.random.default_rng(1)
+    alone = rng.normal(size=rows.values.shape)
+    assert shared_error(replace(rows, values=alone), tell) < 1.3
+    together = np.convolve(rng.normal(size=len(alone)), np.ones(4) / 2.0, "same")
+    lasting = replace(rows, values=together[:, None] * np.ones((1, 2)))
+    assert shared_error(lasting, tell) > 1.5
