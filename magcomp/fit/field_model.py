@@ -206,9 +206,8 @@ def correction_at(parameters: FloatArray) -> Correction:
 
 
 def motor_columns(slopes: FloatArray) -> FloatArray:
-    """Derivatives by the motor vectors of all parts, shape (n, 2, k, 3)."""
-    others = slopes[:, :, SIZE:].reshape(*slopes.shape[:2], -1, 3)
-    return np.concatenate([slopes[:, :, None, MOTOR], others], axis=2)
+    """Of derivatives (size, 2, n) those by the motor vectors of all parts, shape (k, 3, 2, n)."""
+    return np.concatenate([slopes[MOTOR], slopes[SIZE:]]).reshape(-1, 3, *slopes.shape[1:])
 
 
 def parameters_of(fit: MotorFit, lags: Lags) -> FloatArray:
