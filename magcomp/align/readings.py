@@ -18,6 +18,7 @@ from magcomp.model import (
     Readings,
     Recording,
     Series,
+    median,
 )
 
 PARAMETER_SETTLE_S = 1.5
@@ -197,7 +198,7 @@ def in_gap(time: FloatArray, known: FloatArray) -> BoolArray:
         return np.zeros(len(time), dtype=bool)
     after = np.clip(np.searchsorted(known, time), 1, len(known) - 1)
     width = known[after] - known[after - 1]
-    limit = max(0.5, 2.5 * float(np.median(np.diff(known))))
+    limit = max(0.5, 2.5 * float(median(np.diff(known))))
     outside = (time < known[0] - limit) | (time > known[-1] + limit)
     return np.asarray((width > limit) | outside)
 
