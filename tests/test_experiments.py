@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from browser_checks import assert_clean, axe_findings, clipped_labels, show
 from chromium import chromium_page, find_chromium
+from json_schema import must_be
 from truth import FIXTURES
 
 from magcomp.cli.app import run
@@ -42,6 +43,10 @@ def written(tmp_path_factory):
 @pytest.fixture(scope="module")
 def table(written):
     return json.loads((written / "table.json").read_text())
+
+
+def test_the_table_is_as_the_schema_says(table):
+    must_be("reproduction", table)
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -152,8 +152,9 @@ def _flights(
     table: Any, rows: IntArray, paths: Mapping[str, str] | None = None
 ) -> Sequence[Flight]:
     """Some rows as flights, made without Python looking for circles among them again and again."""
-    chosen = table.take(rows)
-    columns = {name: _column(chosen, name) for name in Flight._fields}
+    if not len(rows):
+        return []
+    columns = {name: _column(table, name, rows) for name in Flight._fields}
     if paths is not None:
         columns["path"] = [paths[digest] for digest in columns["digest"]]
     enabled = gc.isenabled()
@@ -165,12 +166,12 @@ def _flights(
             gc.enable()
 
 
-def _column(table: Any, name: str) -> Sequence[Any]:
+def _column(table: Any, name: str, which: IntArray) -> Sequence[Any]:
     if name not in VECTORS:
-        return listed(table, name)
+        return listed(table, name, which)
     flat = table.column(name).combine_chunks().flatten().to_numpy(zero_copy_only=False)
     rows: Any = np.asarray(flat, dtype=np.float64).reshape(len(table), VECTORS[name])
-    return list(rows)
+    return list(rows[which])
 
 
 def by(flights: Sequence[Flight], name: str) -> Mapping[Any, list[Flight]]:

@@ -136,16 +136,19 @@ def words_of(table: Any, name: str) -> tuple[list[str], NDArray[np.intp]]:
     return encoded.dictionary.to_pylist(), encoded.indices.to_numpy().astype(np.intp)
 
 
-def listed(table: Any, name: str) -> list[Any]:
-    """A column as a list; rows that say the same share one text, which is made only once."""
+def listed(table: Any, name: str, rows: NDArray[np.intp] | None = None) -> list[Any]:
+    """A column of some rows as a list; those that say the same share one text, made only once."""
     column = table.column(name)
     pa, _ = arrow()
-    if not pa.types.is_string(column.type):
-        found: list[Any] = column.to_numpy().tolist()
-        return found
-    words, which = words_of(table, name)
-    shared: list[Any] = np.array([*words, None], dtype=object)[which].tolist()
-    return shared
+    if pa.types.is_string(column.type):
+        words, which = words_of(table, name)
+        found = np.array([*words, None], dtype=object)
+        chosen = which if rows is None else which[rows]
+        shared: list[Any] = found[chosen].tolist()
+        return shared
+    values = column.to_numpy()
+    plain: list[Any] = (values if rows is None else values[rows]).tolist()
+    return plain
 
 
 def table_of(rows: Iterable[Row]) -> Any:
