@@ -297,7 +297,9 @@ def with_wander(problem: Problem, found: FlightEstimate, free: int) -> tuple[Fli
     """
 
     def part_at(parameters: FloatArray) -> Reduced:
-        return weighed(rows_at(problem, parameters, found.errors))
+        samples = problem.sample(lags_of(parameters))
+        values, slopes, pulls = rows_of(samples, parameters, found.errors)
+        return weighed(Rows(samples.time, values, slopes, pulls * float(np.std(samples.total))))
 
     calibrated = is_calibrated(problem.readings.in_force[-1].correction)
     beliefs = [
@@ -323,13 +325,6 @@ def with_wander(problem: Problem, found: FlightEstimate, free: int) -> tuple[Fli
     covariance = _SIZES_UNKNOWN**2 * answer.covariance
     moved = 1 if likely == 1 else len(GROUPS)
     return replace(found, parameters=answer.parameters, covariance=covariance), moved
-
-
-def rows_at(problem: Problem, parameters: FloatArray, errors: Noise | None) -> Rows:
-    """The readings at some parameters, shape (SIZE,), with independent errors."""
-    samples = problem.sample(lags_of(parameters))
-    values, slopes, pulls = rows_of(samples, parameters, errors)
-    return Rows(samples.time, values, slopes, pulls * float(np.std(samples.total)))
 
 
 def _believed(problem: Problem, offset: float, soft_iron: float, *, is_open: bool) -> Prior:

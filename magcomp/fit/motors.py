@@ -14,7 +14,6 @@ import numpy as np
 
 from magcomp.fit.field_model import SIZE
 from magcomp.fit.robust import Estimate
-from magcomp.fit.wander import Rows, starts_of, weights_and_rest
 from magcomp.model import MOTOR, FloatArray
 
 _WIDTHS = np.concatenate([[0.0], np.geomspace(0.01, 100.0, 41)])
@@ -22,8 +21,6 @@ _WIDTHS = np.concatenate([[0.0], np.geomspace(0.01, 100.0, 41)])
 
 _SMALL = 1e-6
 """Of the differences' own variance: keeps the matrix from being singular at no width."""
-
-_TINY = 1e-30
 
 Found = TypeVar("Found", bound=Estimate)
 
@@ -53,50 +50,44 @@ def differences_of(size: int) -> FloatArray:
     return made
 
 
-def shared_error(rows: Rows, tell: FloatArray) -> float:
-    """How much less than readings of their own the readings of a second say of the differences.
+def no_surer_than(plain: Estimate, found: Estimate) -> FloatArray:
+    """What makes the differences of an estimate no better known than by plain least squares.
 
     Parameters
     ----------
-    rows
-        Readings at the solution, with residuals of independent errors.
-    tell
-        From :func:`differences_of`.
+    plain
+        Least squares, whose covariance is made of blocks of time.
+    found
+        Of the same readings, with what wanders taken out: it knows the differences as well as its
+        model is right.
 
     Returns
     -------
-    float
-        By what the variance of the differences is larger than of independent readings, 1 or more.
+    ndarray
+        Stretches the deviations of the parameters, shape (size, size).
 
     Notes
     -----
-    What a motor draws between two of its outputs is not told, and lasts longer than a reading: its
-    neighbours err alike. So the square of the sum of their scores is compared with the sum of
-    their squares. What lasts for longer than a second is a state of its own.
+    A total current that is wrong while one motor works harder looks like a difference along the
+    motors' common vector. No model of wandering has that; in the sums over blocks it is.
     """
-    weights, left = weights_and_rest(rows.time, rows.values)
-    scores = np.einsum("ngi,ng->ni", rows.slopes @ tell.T, weights * left)
-    together = np.add.reduceat(scores, starts_of(rows.time), axis=0)
-    apart = np.sum(scores**2, axis=0)
-    return max(1.0, float(np.mean(np.sum(together**2, axis=0) / np.maximum(apart, _TINY))))
-
-
-def told_together(found: Found, rows: Rows) -> Found:
-    """The estimate with the differences less certain by what neighbouring readings err alike."""
     tell = differences_of(len(found.parameters))
-    # Along the differences alone: the directions that all readings tell have their blocks of time.
-    stretch = np.eye(len(found.parameters))
-    stretch += (np.sqrt(shared_error(rows, tell)) - 1.0) * tell.T @ tell
-    return replace(found, covariance=stretch @ found.covariance @ stretch.T)
+    surer = float(np.trace(tell @ found.covariance @ tell.T))
+    square = float(np.trace(tell @ plain.covariance @ tell.T))
+    longer = np.sqrt(square / surer) if square > surer > 0.0 else 1.0
+    return np.eye(len(found.parameters)) + (longer - 1.0) * tell.T @ tell
 
 
-def alike_where_unseen(found: Found, unsure: float = 0.0) -> Found:
+def alike_where_unseen(found: Found, stretch: FloatArray, unsure: float = 0.0) -> Found:
     """The estimate with a prior that motors disturb alike, of every width that may be.
 
     Parameters
     ----------
     found
         Made without such a prior; its parameters end with the other motors' vectors.
+    stretch
+        From :func:`no_surer_than`. It widens what comes out, not what differences are weighed by:
+        those that one current's errors make are not smaller for being taken as alike.
     unsure
         As :class:`magcomp.model.Control` has it.
 
@@ -125,11 +116,8 @@ def alike_where_unseen(found: Found, unsure: float = 0.0) -> Found:
     weights /= weights.sum()
     move = weights @ np.array(moves)
     off = np.array(moves) - move
-    return replace(
-        found,
-        parameters=found.parameters - move,
-        covariance=found.covariance
-        - np.tensordot(weights, np.array(gains), 1)
-        + (off * weights[:, None]).T @ off
-        + unsure**2 * float(np.mean(apart**2)) * tell.T @ tell,
-    )
+    covariance = found.covariance - np.tensordot(weights, np.array(gains), 1)
+    covariance += (off * weights[:, None]).T @ off
+    covariance = stretch @ covariance @ stretch.T
+    covariance += unsure**2 * float(np.mean(apart**2)) * tell.T @ tell
+    return replace(found, parameters=found.parameters - move, covariance=covariance)

@@ -12,9 +12,9 @@ from unequal import VECTORS, Unequal
 
 from magcomp.align import controls, currents_of_motors, readings, to_undo
 from magcomp.fit import Problem, best_form, fit
-from magcomp.fit.field_model import parameters_of
-from magcomp.fit.flight import rows_at
-from magcomp.fit.motors import contrasts, differences_of, shared_error
+from magcomp.fit.field_model import SIZE
+from magcomp.fit.motors import contrasts, differences_of, no_surer_than
+from magcomp.fit.robust import Estimate
 from magcomp.judge import judge
 from magcomp.judge.forms import forms, left_deg
 from magcomp.model import CURRENT, Lags
@@ -147,14 +147,15 @@ def test_a_difference_that_the_flight_does_not_show_is_not_known_to_be_nothing()
     assert np.sqrt(np.diag(found.told_apart)).max() > 20.0
 
 
-def test_readings_that_err_alike_for_a_while_say_less_of_the_differences():
-    problem, found = fitted(1)
-    parameters = parameters_of(found, found.lags)
-    rows = rows_at(problem, parameters, None)
-    tell = differences_of(len(parameters))
+def test_differences_are_no_better_known_than_by_plain_least_squares():
+    tell = differences_of(SIZE + 9)
     rng = np.random.default_rng(1)
-    alone = rng.normal(size=rows.values.shape)
-    assert shared_error(replace(rows, values=alone), tell) < 1.3
-    together = np.convolve(rng.normal(size=len(alone)), np.ones(4) / 2.0, "same")
-    lasting = replace(rows, values=together[:, None] * np.ones((1, 2)))
-    assert shared_error(lasting, tell) > 1.5
+    root = rng.normal(size=(SIZE + 9, SIZE + 9))
+    sure = Estimate(np.zeros(len(root)), root @ root.T, np.ones(2), 0.0, np.zeros((4, 2)))
+    plain = replace(sure, covariance=9.0 * sure.covariance)
+    stretch = no_surer_than(plain, sure)
+    wide = stretch @ sure.covariance @ stretch.T
+    np.testing.assert_allclose(tell @ wide @ tell.T, tell @ plain.covariance @ tell.T)
+    common = np.eye(len(root)) - tell.T @ tell
+    np.testing.assert_allclose(common @ wide @ common, common @ sure.covariance @ common, atol=1e-9)
+    np.testing.assert_array_equal(no_surer_than(sure, plain), np.eye(len(root)))

@@ -234,10 +234,10 @@ def options_line(options: Options, analysis: Analysis | None, keys: Sequence[str
         ("time", time_range(options)),
     )
     texts = [
-        Content.assemble((f" {key}", "bold $accent"), (f" {name} ", "$quiet"), value)
+        Content.assemble((key, "bold $accent"), (f" {name} ", "$quiet"), value)
         for key, (name, value) in zip(keys, parts, strict=True)
     ]
-    return Content(" ").join(texts)
+    return Content("  ").join(texts)
 
 
 def grades_line(analysis: Analysis, shown: int, *, early: bool = False) -> Content:

@@ -80,7 +80,7 @@ class VerifyScreen(StepScreen):
         self.say(state.busy.sentence if state.busy is not None else self._next())
 
     def _show_state(self) -> None:
-        said = "\n".join(f" {line}" for line in state_lines(self.state))
+        said = "\n".join(state_lines(self.state))
         if said != self._said:
             self._said = said
             self.query_one("#held-now", Static).update(Content(said))
