@@ -25,7 +25,7 @@ import sys
 import tempfile
 import termios
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -166,45 +166,84 @@ def free_port() -> int:
         return port
 
 
-def show(title: str, screen: str) -> None:
+Show = Callable[[str, Terminal], None]
+"""Told what a screen is, when it has come."""
+
+
+def printed(title: str, terminal: Terminal) -> None:
     """Print a screen in a frame."""
     edge = "─" * COLUMNS
     print(f"\n{title}\n┌{edge}┐", flush=True)
-    print("\n".join(f"│{line:<{COLUMNS}}│" for line in screen.split("\n")))
+    print("\n".join(f"│{line:<{COLUMNS}}│" for line in terminal.text.split("\n")))
     print(f"└{edge}┘", flush=True)
 
 
-def first_flight(terminal: Terminal, port: int, saved: Path) -> None:
+def first_flight(terminal: Terminal, port: int, saved: Path, show: Show) -> None:
     """Connect, record, fit, save and write."""
-    show("Start", terminal.until(r"Choose with the arrows", "what to choose"))
+
+    def come(title: str, pattern: str, what: str) -> None:
+        terminal.until(pattern, what)
+        show(title, terminal)
+
+    come("Start", r"Choose with the arrows", "what to choose")
     terminal.press("a", f"udp:127.0.0.1:{port}", "\r")
-    show("Connected", terminal.until(r"Press N to record", "that the vehicle is found"))
+    come("Connected", r"Press N to record", "that the vehicle is found")
     terminal.press("n")
-    show("Recording", terminal.until(r"at hover at most.*time 0[1-9]", "a bound at the hover"))
-    show("Flown", terminal.until(r"disarmed.*Then press N", "that it is enough"))
+    come("Recording", r"at hover at most.*time 0[1-9]", "a bound at the hover")
+    come("Flown", r"disarmed.*Then press N", "that it is enough")
     terminal.press("n")
-    show("Fitted", terminal.until(r"press N to see what would", "the fit"))
+    come("Fitted", r"press N to see what would", "the fit")
     terminal.press("n")
-    show("To be written", terminal.until(r"Press W to write", "what would change"))
+    come("To be written", r"Press W to write", "what would change")
     terminal.press("s")
     terminal.until(r"Save a parameter file", "the question for a file")
     terminal.press("\x01", "\x0b", str(saved), "\r")
     terminal.until(r"Saved to", "that the file is saved")
     terminal.press("w")
-    show("Asked", terminal.until(r"Write \d+ parameters", "the question before it writes"))
+    come("Asked", r"Write \d+ parameters", "the question before it writes")
     terminal.press("y")
-    show("Written", terminal.until(r"read back as written", "that it is written"))
+    come("Written", r"read back as written", "that it is written")
     terminal.press("n")
-    show("Verify", terminal.until(r"Fly as before and land", "what to do to verify"))
+    come("Verify", r"Fly as before and land", "what to do to verify")
 
 
-def next_flight(terminal: Terminal) -> None:
+def next_flight(terminal: Terminal, show: Show) -> None:
     """Wait for the verdict on what was written."""
-    show("In the air again", terminal.until(r"ARMED", "that it flies"))
-    show("Measured", terminal.until(r"promised at most.*measured", "the verdict"))
+    terminal.until(r"ARMED", "that it flies")
+    show("In the air again", terminal)
+    terminal.until(r"promised at most.*measured", "the verdict")
+    show("Measured", terminal)
     terminal.press("q")
     code = terminal.wait()
-    show(f"Left, exit code {code}", terminal.text)
+    show(f"Left, exit code {code}", terminal)
+
+
+def drive(options: Sequence[str], show: Show) -> None:
+    """Drive the whole road.
+
+    Parameters
+    ----------
+    options
+        Of the simulated vehicle.
+    show
+        Told of each screen.
+    """
+    with tempfile.TemporaryDirectory(prefix="magcomp-road-") as folder:
+        place, port = Path(folder), free_port()
+        saved = place / "written.param"
+        # Everything the program keeps goes where it is gone afterwards.
+        home = {"XDG_CONFIG_HOME": folder, "XDG_DATA_HOME": folder, "HOME": folder}
+        terminal = Terminal([sys.executable, "-m", "magcomp", "tui"], home)
+        try:
+            with vehicle(port, *options):
+                first_flight(terminal, port, saved, show)
+            terminal.until(r"link is lost", "that the vehicle is gone")
+            show("Switched off", terminal)
+            time.sleep(SILENCE_S)
+            with vehicle(port, *options, "--parameters", str(saved)):
+                next_flight(terminal, show)
+        finally:
+            terminal.close()
 
 
 def main() -> None:
@@ -218,21 +257,7 @@ def main() -> None:
     signal.signal(signal.SIGTERM, lambda *_: sys.exit("stopped"))
     options = ["--speed", str(given.speed), "--autopilot", given.autopilot]
     options += ["--seed", str(given.seed)]
-    with tempfile.TemporaryDirectory(prefix="magcomp-road-") as folder:
-        place, port = Path(folder), free_port()
-        saved = place / "written.param"
-        # Everything the program keeps goes where it is gone afterwards.
-        home = {"XDG_CONFIG_HOME": folder, "XDG_DATA_HOME": folder, "HOME": folder}
-        terminal = Terminal([sys.executable, "-m", "magcomp", "tui"], home)
-        try:
-            with vehicle(port, *options):
-                first_flight(terminal, port, saved)
-            show("Switched off", terminal.until(r"link is lost", "that the vehicle is gone"))
-            time.sleep(SILENCE_S)
-            with vehicle(port, *options, "--parameters", str(saved)):
-                next_flight(terminal)
-        finally:
-            terminal.close()
+    drive(options, printed)
 
 
 if __name__ == "__main__":

@@ -19,6 +19,7 @@ from magcomp.align import (
 )
 from magcomp.align.health import compass_complaints, current_complaints, vehicle_complaints
 from magcomp.align.orientation import orientation_complaint
+from magcomp.analysis.by_evidence import motors_where_better
 from magcomp.analysis.choose import with_speed_controllers
 from magcomp.analysis.compare import Judged, beaten, better
 from magcomp.analysis.emit import Emission, emit
@@ -160,9 +161,16 @@ def analyse(
     progress("done", 1.0)
     chosen = MOTORS if MOTORS in judged else better(judged)
     answers = [as_written(recording, each) for each in judged[chosen]]
+    forms_of = compared(judged, motors, reported(found).get(THROTTLE))
+    if wanted.regressor == "auto" and chosen == CURRENT:
+        answers = motors_where_better(
+            recording,
+            answers,
+            forms_of,
+            lambda compass: _one(recording, compass, wanted, motors, in_force, earth),
+        )
     emitted = emit(recording, [each.written for each in answers])
     nothing = all(each.judged.is_rejected for each in answers)
-    forms_of = compared(judged, motors, reported(found).get(THROTTLE))
     held_out = {k: tuple(j.held_out for j in results) for k, results in judged.items()} | plain
     why_not = why_only_to_look_at(recording, chosen)
     return Analysis(
@@ -180,7 +188,15 @@ def analyse(
         ),
         notes=(
             *notes_of(recording, wanted.compass, held_out, chosen),
-            *forms_notes(forms_of, judged, chosen),
+            *forms_notes(
+                {
+                    each.judged.fit.compass: forms_of[each.judged.fit.compass]
+                    for each in answers
+                    if each.judged.fit.compass in forms_of and not each.parameters
+                },
+                judged,
+                chosen,
+            ),
             *lacking_notes(lacking, judged),
             *hints([each.judged.fit for each in answers]),
         ),
@@ -209,6 +225,8 @@ def _result(
 def check(recording: Recording, options: Options | None = None) -> Mapping[int, Verdict]:
     """Judge the calibration in force of each compass; nothing is fitted.
 
+    A compass of which too much is missing is left out, as by :func:`analyse`.
+
     Raises
     ------
     MissingDataError
@@ -219,21 +237,38 @@ def check(recording: Recording, options: Options | None = None) -> Mapping[int, 
     found = _controls_of(recording)
     earth = expected_earth(recording)
     by_kind = to_undo(recording, found)
-    verdicts = {}
+    verdicts: dict[int, Verdict] = {}
+    lacking: list[MissingDataError] = []
     for compass in compasses:
-        new = thinned(readings(recording, compass, start=wanted.start, end=wanted.end))
-        kind = _single(new.in_force[-1].regressor) or found[0].kind
-        if kind not in by_kind:
-            raise MissingDataError(
-                f"Compass {compass} is corrected by {kind}, so {recording.source} must hold the "
-                f"{kind}; instead it holds {', '.join(by_kind)}"
-            )
-        problem = Problem(new, by_kind[kind], by_kind, earth)
-        with solvable(compass):
-            verdict = judge_present(problem, complaints=_complaints(recording, compass, kind))
-        require_finite(compass, _bounds(verdict))
-        verdicts[compass] = _in_words_of(recording, verdict)
+        try:
+            verdicts[compass] = _checked(recording, compass, wanted, found[0].kind, by_kind, earth)
+        except MissingDataError as error:
+            lacking.append(error)
+    if not verdicts:
+        raise lacking[0]
     return verdicts
+
+
+def _checked(
+    recording: Recording,
+    compass: int,
+    wanted: Options,
+    usual: str,
+    by_kind: Mapping[str, Control],
+    earth: EarthField,
+) -> Verdict:
+    new = thinned(readings(recording, compass, start=wanted.start, end=wanted.end))
+    kind = _single(new.in_force[-1].regressor) or usual
+    if kind not in by_kind:
+        raise MissingDataError(
+            f"Compass {compass} is corrected by {kind}, so {recording.source} must hold the "
+            f"{kind}; instead it holds {', '.join(by_kind)}"
+        )
+    problem = Problem(new, by_kind[kind], by_kind, earth)
+    with solvable(compass):
+        verdict = judge_present(problem, complaints=_complaints(recording, compass, kind))
+    require_finite(compass, _bounds(verdict))
+    return _in_words_of(recording, verdict)
 
 
 def _single(kind: str | None) -> str | None:
