@@ -50,6 +50,7 @@ from magcomp.model.recording import (
     Vehicle,
     compasses_of,
     interpolate,
+    running_mean,
 )
 from magcomp.model.samples import (
     Control,
@@ -107,6 +108,7 @@ __all__ = [
     "interpolate",
     "pack",
     "quantity_of",
+    "running_mean",
     "symmetric",
     "unit_of",
     "unpack",
