@@ -8,14 +8,19 @@ BIN    := $(VENV)/bin
 demo: $(VENV)/installed
 	@$(BIN)/magcomp demo
 
+# Tests start many programs, and each would compile anew what an environment forbids to keep.
+test tests-only test-all coverage: export PYTHONDONTWRITEBYTECODE :=
+test tests-only test-all coverage: export PYTHONPYCACHEPREFIX := $(CURDIR)/$(VENV)/compiled
+
 # All but what waits or computes for tens of seconds; `make test-all` has that too, and looks
 # five times as long for what breaks a parser or a protocol.
 # The linters run beside the tests, in the time in which those wait for each other.
 test: $(VENV)/installed-dev
 	@$(MAKE) --no-print-directory -j 2 lint tests-only
 
-tests-only: $(VENV)/installed-dev
-	@$(BIN)/python -m pytest -n 2 --dist worksteal -q -m "not slow"
+# Three workers for two cores: some tests wait.
+tests-only: $(VENV)/compiled
+	@$(BIN)/python -m pytest -n 3 --dist worksteal -q -m "not slow"
 
 test-all: $(VENV)/installed-dev lint
 	@MAGCOMP_EFFORT=5 $(BIN)/python -m pytest -n 2 --dist worksteal -q
@@ -78,6 +83,11 @@ $(VENV)/installed-dev: pyproject.toml | $(VENV)/bin/python
 	@echo "Setting up magcomp and its test tools in $(VENV) ..."
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile -e '.[dev]'
 	@touch $(VENV)/installed $@
+
+# What every worker would compile for itself at the same time.
+$(VENV)/compiled: | $(VENV)/installed-dev
+	@$(BIN)/python -m pytest --collect-only -q > $@.log || true
+	@mkdir -p $@
 
 clean:
 	rm -rf $(VENV) build dist .mypy_cache .ruff_cache .pytest_cache .import_linter_cache

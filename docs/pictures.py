@@ -25,7 +25,7 @@ SIZE = (118, 38)
 SPEED = 3.0
 
 
-def simulate() -> Simulation:
+def simulate(autopilot: str) -> Simulation:
     """A vehicle, three times as fast as life."""
     stop, ready, address = threading.Event(), threading.Event(), []
 
@@ -33,7 +33,7 @@ def simulate() -> Simulation:
         address.append(reached_at)
         ready.set()
 
-    vehicle = Vehicle(scenario("flight", seed=11), wait_for_ground=True)
+    vehicle = Vehicle(scenario("flight", seed=11), wait_for_ground=True, autopilot=autopilot)
     options = {"speed": SPEED, "announce": announce, "stop": stop}
     threading.Thread(
         target=serve, args=("udp:127.0.0.1:0", vehicle), kwargs=options, daemon=True

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from browser_checks import assert_clean, axe_findings, clipped_labels, show
 from chromium import chromium_page, find_chromium
+from json_schema import must_be
 from truth import FIXTURES
 
 from magcomp.cli.app import run
@@ -42,6 +43,10 @@ def written(tmp_path_factory):
 @pytest.fixture(scope="module")
 def table(written):
     return json.loads((written / "table.json").read_text())
+
+
+def test_the_table_is_as_the_schema_says(table):
+    must_be("reproduction", table)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -139,7 +144,7 @@ def test_the_claims_do_not_depend_on_the_vehicle(seed, tmp_path):
     assert all(row.magcomp_deg <= PROMISED_DEG for row in rows)
 
 
-@pytest.mark.parametrize("compass", [1, 2, 3])
+@pytest.mark.parametrize("compass", [1, pytest.param(2, marks=pytest.mark.slow), 3])
 def test_the_recorded_claims_hold_for_every_compass(compass):
     assert all(row.magcomp_deg <= PROMISED_DEG for row in recorded(compass).rows)
 

@@ -27,6 +27,7 @@ from magcomp.model import (
     Recording,
     Series,
     interpolate,
+    median,
     running_mean,
 )
 
@@ -225,7 +226,7 @@ def rebuild(reference: Series, duty: Series, kind: str, name: str) -> Rebuilt | 
     """
     if len(reference) < _LEAST_ROWS:
         return None
-    powers = np.stack([np.mean(duty.value**k, axis=1) for k in POWERS], axis=1)
+    powers = np.array([np.mean(duty.value**k, axis=1) for k in POWERS]).T
     features = Series(duty.time, powers)
     plain = _rebuilt_through(reference, features, 0.0, kind, name)
     if plain is None:
@@ -277,13 +278,14 @@ def smoothed(series: Series, constant: float) -> Series:
 
 def _regress(reference: Series, features: Series, shift: float) -> tuple[FloatArray, float]:
     """Robust coefficients at one shift in time, and the robust mean square they leave."""
-    rows = np.column_stack([np.ones(len(reference)), interpolate(features, reference.time - shift)])
+    columns = np.ones((1 + features.value.shape[1], len(reference)))
+    columns[1:] = interpolate(features, reference.time - shift).T
     weight = np.ones(len(reference))
-    ridge = 1e-9 * np.eye(rows.shape[1]) * len(reference)
+    ridge = 1e-9 * np.eye(len(columns)) * len(reference)
     for _ in range(4):
-        weighted = rows * weight[:, None]
-        coefficients = np.linalg.solve(rows.T @ weighted + ridge, weighted.T @ reference.value)
-        left = reference.value - rows @ coefficients
-        spread = 1.4826 * float(np.median(np.abs(left))) + 1e-3 * float(np.ptp(reference.value))
+        weighted = columns * weight
+        coefficients = np.linalg.solve(weighted @ columns.T + ridge, weighted @ reference.value)
+        left = reference.value - coefficients @ columns
+        spread = 1.4826 * float(median(np.abs(left))) + 1e-3 * float(np.ptp(reference.value))
         weight = 1 / (1 + (left / (3 * spread)) ** 2)
     return np.asarray(coefficients), float(np.average(left**2, weights=weight))

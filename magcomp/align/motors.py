@@ -6,14 +6,26 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from magcomp.align.between import expected
 from magcomp.align.control import POWERS, duty_of, rebuild, reported, smoothed
-from magcomp.model import DRIVE, MOTORS, Control, Recording, Series, interpolate
+from magcomp.align.readings import in_gap
+from magcomp.model import (
+    DRIVE,
+    MOTORS,
+    BoolArray,
+    Control,
+    FloatArray,
+    Recording,
+    Series,
+    interpolate,
+)
 
 SMOOTHINGS_S = (0.0, 0.05)
 """Time constants with which a motor may follow its output; the fit decides."""
 
 _LEAST_MOTORS = 2
 _LEAST_A = 1e-3
+_STEP_S, _MOST_ROWS = 0.1, 100_000
 
 
 def currents_of_motors(recording: Recording) -> tuple[Control, ...]:
@@ -29,7 +41,8 @@ def currents_of_motors(recording: Recording) -> tuple[Control, ...]:
     Notes
     -----
     The battery's current is regressed on powers of all duties. Each power is a sum over the
-    motors, so each motor's share of it is its current (docs/method.md, Motor by motor).
+    motors, so each motor's share of it is its current. Between the times the outputs are told at
+    the share is what is to be expected (docs/method.md, Motor by motor).
     """
     duty = duty_of(recording)
     if recording.current is None or duty is None or len(duty.numbers) < _LEAST_MOTORS:
@@ -42,11 +55,15 @@ def currents_of_motors(recording: Recording) -> tuple[Control, ...]:
         slope * duty.series.value**power for slope, power in zip(slopes, POWERS, strict=True)
     )
     each = np.maximum((level + curved) / len(duty.numbers), 0.0)
-    time = found.control.series.time
     # The battery sags for all motors alike: what outputs do not explain is shared in proportion.
-    share = each / np.maximum(each.sum(axis=1, keepdims=True), _LEAST_A)
+    told = each / np.maximum(each.sum(axis=1, keepdims=True), _LEAST_A)
+    time = _often(found.control.series.time)
+    told_at = Series(found.control.series.time, told)
+    turns = each.sum(axis=1) > _LEAST_A
+    shares = [_between(told_at, turns, time, lasting=lasting) for lasting in (True, False)]
+    unsure = _apart(interpolate(told_at, time), shares[-1])
     totals = {
-        "as the outputs tell it": found.control.series.value,
+        "as the outputs tell it": interpolate(found.control.series, time),
         "as reported": interpolate(recording.current, time),
     }
     return tuple(
@@ -56,10 +73,39 @@ def currents_of_motors(recording: Recording) -> tuple[Control, ...]:
             f"battery current {how}, shared out by the motor outputs, which each motor follows "
             f"within {1000 * constant:.0f} ms",
             duty.numbers,
+            unsure,
         )
+        for share in shares
         for how, total in totals.items()
         for constant in SMOOTHINGS_S
     )
+
+
+def _often(time: FloatArray) -> FloatArray:
+    """Times so close that a straight line between two of them is exact; none where nobody told."""
+    count = min(int((time[-1] - time[0]) / _STEP_S) + 1, _MOST_ROWS)
+    even = np.linspace(time[0], time[-1], max(count, len(time)))
+    return np.asarray(even[~in_gap(even, time)])
+
+
+def _between(told: Series, turns: BoolArray, time: FloatArray, *, lasting: bool) -> FloatArray:
+    """Shares of the motors at other times; what was told at rest says nothing of a flight."""
+    if not turns.any():
+        return interpolate(told, time)
+    return np.maximum(
+        expected(Series(told.time[turns], told.value[turns]), time, lasting=lasting), 0.0
+    )
+
+
+def _apart(kept: FloatArray, passing: FloatArray) -> float:
+    """How uncertain the size of the differences is: the truth is anywhere between the two.
+
+    Where what is gone at once was taken to last, a slope comes out too small by its share of the
+    square; evenly likely from there to nothing, that has the standard deviation of 1 / √3 of it.
+    """
+    square = float(np.mean((kept - kept.mean(axis=0)) ** 2))
+    gone = float(np.mean((kept - passing) ** 2))
+    return min(1.0, gone / square) / float(np.sqrt(3.0)) if square > 0.0 else 0.0
 
 
 def drive_of_motors(recording: Recording) -> Control | None:

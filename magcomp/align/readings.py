@@ -18,6 +18,7 @@ from magcomp.model import (
     Readings,
     Recording,
     Series,
+    median,
 )
 
 PARAMETER_SETTLE_S = 1.5
@@ -84,7 +85,7 @@ def readings(
     )
     if corrected:
         keep &= _away_from(reported.time, changes)
-    keep &= ~_in_gap(reported.time, recording.attitude.time)
+    keep &= ~in_gap(reported.time, recording.attitude.time)
     keep &= _usable_state(reported.time, recording.armed)
     if not keep.any():
         raise MissingDataError(
@@ -144,7 +145,7 @@ def _unusable(asked: int, all_: int) -> str:
 
 def within(readings: Readings, known: Series) -> Readings:
     """The readings at times where another quantity is known, not interpolated across a gap."""
-    inside = ~_in_gap(readings.time, known.time)
+    inside = ~in_gap(readings.time, known.time)
     return readings if inside.all() else readings.where(inside)
 
 
@@ -188,7 +189,7 @@ def _away_from(time: FloatArray, moments: tuple[float, ...]) -> BoolArray:
     return np.asarray(near > PARAMETER_SETTLE_S)
 
 
-def _in_gap(time: FloatArray, known: FloatArray) -> BoolArray:
+def in_gap(time: FloatArray, known: FloatArray) -> BoolArray:
     """Whether the neighbours in ``known`` stand too far apart to interpolate between.
 
     One value alone is a constant: it holds everywhere.
@@ -197,7 +198,7 @@ def _in_gap(time: FloatArray, known: FloatArray) -> BoolArray:
         return np.zeros(len(time), dtype=bool)
     after = np.clip(np.searchsorted(known, time), 1, len(known) - 1)
     width = known[after] - known[after - 1]
-    limit = max(0.5, 2.5 * float(np.median(np.diff(known))))
+    limit = max(0.5, 2.5 * float(median(np.diff(known))))
     outside = (time < known[0] - limit) | (time > known[-1] + limit)
     return np.asarray((width > limit) | outside)
 

@@ -209,6 +209,8 @@ def _result(
 def check(recording: Recording, options: Options | None = None) -> Mapping[int, Verdict]:
     """Judge the calibration in force of each compass; nothing is fitted.
 
+    A compass of which too much is missing is left out, as by :func:`analyse`.
+
     Raises
     ------
     MissingDataError
@@ -219,21 +221,38 @@ def check(recording: Recording, options: Options | None = None) -> Mapping[int, 
     found = _controls_of(recording)
     earth = expected_earth(recording)
     by_kind = to_undo(recording, found)
-    verdicts = {}
+    verdicts: dict[int, Verdict] = {}
+    lacking: list[MissingDataError] = []
     for compass in compasses:
-        new = thinned(readings(recording, compass, start=wanted.start, end=wanted.end))
-        kind = _single(new.in_force[-1].regressor) or found[0].kind
-        if kind not in by_kind:
-            raise MissingDataError(
-                f"Compass {compass} is corrected by {kind}, so {recording.source} must hold the "
-                f"{kind}; instead it holds {', '.join(by_kind)}"
-            )
-        problem = Problem(new, by_kind[kind], by_kind, earth)
-        with solvable(compass):
-            verdict = judge_present(problem, complaints=_complaints(recording, compass, kind))
-        require_finite(compass, _bounds(verdict))
-        verdicts[compass] = _in_words_of(recording, verdict)
+        try:
+            verdicts[compass] = _checked(recording, compass, wanted, found[0].kind, by_kind, earth)
+        except MissingDataError as error:
+            lacking.append(error)
+    if not verdicts:
+        raise lacking[0]
     return verdicts
+
+
+def _checked(
+    recording: Recording,
+    compass: int,
+    wanted: Options,
+    usual: str,
+    by_kind: Mapping[str, Control],
+    earth: EarthField,
+) -> Verdict:
+    new = thinned(readings(recording, compass, start=wanted.start, end=wanted.end))
+    kind = _single(new.in_force[-1].regressor) or usual
+    if kind not in by_kind:
+        raise MissingDataError(
+            f"Compass {compass} is corrected by {kind}, so {recording.source} must hold the "
+            f"{kind}; instead it holds {', '.join(by_kind)}"
+        )
+    problem = Problem(new, by_kind[kind], by_kind, earth)
+    with solvable(compass):
+        verdict = judge_present(problem, complaints=_complaints(recording, compass, kind))
+    require_finite(compass, _bounds(verdict))
+    return _in_words_of(recording, verdict)
 
 
 def _single(kind: str | None) -> str | None:

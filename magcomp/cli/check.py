@@ -32,6 +32,6 @@ def check(log: Path, selection: Selection, to_json: bool) -> ExitCode:
     else:
         from magcomp.report import as_text  # noqa: PLC0415 - only people need rich
 
-        answer(as_text.check_text(recording, verdicts, kind, look()))
+        answer(as_text.check_text(recording, verdicts, kind, look(), selection.compass))
     rejected = any(verdict.grade is Grade.REJECTED for verdict in verdicts.values())
     return ExitCode.REJECTED if rejected else ExitCode.GOOD

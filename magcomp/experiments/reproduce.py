@@ -13,6 +13,7 @@ from magcomp.experiments.mission import Flights, flights
 from magcomp.experiments.paper import TABLE_1
 from magcomp.experiments.turntable import Turntable, turntable
 from magcomp.model import Recording
+from magcomp.report.as_json import SCHEMA
 from magcomp.simulate import write_tlog
 from magcomp.sources import read
 from magcomp.sources.truth import Truth, read_truth
@@ -71,7 +72,8 @@ class Reproduction:
             name: None if made is None else _flights(made.flights) for name, made in kinds.items()
         }
         paper = [asdict(row) for row in TABLE_1]
-        return {"magcomp": __version__, **rows, "paper": paper, "flights": flown}
+        head = {"magcomp": __version__, "schema": SCHEMA}
+        return {**head, **rows, "paper": paper, "flights": flown}
 
 
 def reproduce(

@@ -34,7 +34,7 @@ from magcomp.fit.flight import (
 )
 from magcomp.fit.folds import folds
 from magcomp.fit.levels import centres_of_flight, fit_levels, usable_levels, with_line
-from magcomp.fit.motors import alike_where_unseen, blur, differences_of
+from magcomp.fit.motors import alike_where_unseen, differences_of, no_surer_than
 from magcomp.fit.residual import residuals, spread
 from magcomp.fit.robust import Estimate
 from magcomp.fit.sweep import fit_sweep, is_still
@@ -201,11 +201,14 @@ def fit_flight(problem: Problem) -> MotorFit:
     """
     still = still_rows(problem.sample(Lags())) if problem.control.parts == 1 else None
     flown = problem if still is None else problem.where(~still)
-    found, free = with_wander(flown, *_choose_freedom(flown))
+    plain, opened = _choose_freedom(flown)
+    found, free = with_wander(flown, plain, opened)
     tell = differences_of(len(found.parameters))
-    told_apart = tell @ found.covariance @ tell.T
-    if len(told_apart):
-        found = alike_where_unseen(found, blur(problem.control.series.value))
+    told_apart = np.empty((0, 0))
+    if len(tell):
+        stretch = no_surer_than(plain, found)
+        told_apart = tell @ stretch @ found.covariance @ stretch.T @ tell.T
+        found = alike_where_unseen(found, stretch, problem.control.unsure)
     bare = replace(_of_flight(problem, found, free), told_apart=told_apart)
     if still is not None:
         bare = with_sweep(bare, fit_sweep(problem.where(still)))

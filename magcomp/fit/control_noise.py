@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from magcomp.fit.robust import NOISE_FLOOR, spread_of
-from magcomp.model import FloatArray
+from magcomp.model import FloatArray, median
 
 MOST_SHARE = 0.25
 """σᵤ is at most this share of the spread of u: beyond it, u would not be a measurement."""
@@ -89,7 +89,7 @@ def noise_of(values: FloatArray, pulls: FloatArray, spread_u: float) -> Noise | 
     less.
     """
     sensor = spread_of(values.T)
-    signal = float(np.median(np.hypot(*pulls))) * spread_u
+    signal = float(median(np.hypot(*pulls))) * spread_u
     if signal < _LEAST_SIGNAL * float(np.linalg.norm(sensor)):
         return None
     most = MOST_SHARE * spread_u

@@ -20,6 +20,7 @@ from magcomp.model import (
     Lags,
     MotorFit,
     Samples,
+    median,
     pack,
     unpack,
 )
@@ -196,8 +197,8 @@ def _leaning(samples: Samples) -> list[FloatArray]:
     """
     if len(samples) < 2:
         return [np.zeros((2, len(samples))) for _ in LEANS_S]
-    step = max(float(np.median(np.diff(samples.time))), 1e-3)
-    tilt = samples.attitude[:, :2] - np.median(samples.attitude[:, :2], axis=0)
+    step = max(float(median(np.diff(samples.time))), 1e-3)
+    tilt = samples.attitude[:, :2] - median(samples.attitude[:, :2])
     return [low_pass(tilt, step / (each + step)).T for each in LEANS_S]
 
 
@@ -207,9 +208,8 @@ def correction_at(parameters: FloatArray) -> Correction:
 
 
 def motor_columns(slopes: FloatArray) -> FloatArray:
-    """Derivatives by the motor vectors of all parts, shape (n, 2, k, 3)."""
-    others = slopes[:, :, SIZE:].reshape(*slopes.shape[:2], -1, 3)
-    return np.concatenate([slopes[:, :, None, MOTOR], others], axis=2)
+    """Of derivatives (size, 2, n) those by the motor vectors of all parts, shape (k, 3, 2, n)."""
+    return np.concatenate([slopes[MOTOR], slopes[SIZE:]]).reshape(-1, 3, *slopes.shape[1:])
 
 
 def parameters_of(fit: MotorFit, lags: Lags) -> FloatArray:

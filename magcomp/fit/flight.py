@@ -93,6 +93,9 @@ TRUSTED_OFFSET_MGAUSS = 4.0
 TRUSTED_SOFT_IRON = 0.005
 """How well an ordinary calibration in force is taken to be known."""
 
+EACH_MOTOR_MGAUSS_PER_A = 100.0
+"""What a wire at a distance of 2 cm makes: 2 I / d."""
+
 OPEN_OFFSET_MGAUSS = 300.0
 OPEN_SOFT_IRON = 0.15
 
@@ -182,7 +185,8 @@ def prior(problem: Problem, free: int) -> Prior:
     mean[LAGS] = LAG_MEAN_S
     mean[APPLIED_LAG] += problem.readings.applied_later
     width = np.zeros(size)
-    width[MOTOR] = width[SIZE:] = np.inf
+    # Differences that a flight does not show at all must not come out as known to be nothing.
+    width[MOTOR] = width[SIZE:] = np.inf if problem.control.parts == 1 else EACH_MOTOR_MGAUSS_PER_A
     width[OFFSET] = OPEN_OFFSET_MGAUSS if free >= 2 else TRUSTED_OFFSET_MGAUSS
     width[DIAGONAL] = OPEN_SOFT_IRON if free >= 3 else 0.0
     width[OFF_DIAGONAL] = OPEN_SOFT_IRON if free >= 4 else 0.0

@@ -2,7 +2,7 @@
 
 Least squares gives each motor a vector of its own, however little the motors ever differed in
 what they draw. What a flight does not show is better taken as alike: the differences get a prior
-around nothing whose width is the likeliest (docs/method.md, Motor by motor).
+around nothing, of a width that the flight tells (docs/method.md, Motor by motor).
 """
 
 from __future__ import annotations
@@ -21,11 +21,6 @@ _WIDTHS = np.concatenate([[0.0], np.geomspace(0.01, 100.0, 41)])
 
 _SMALL = 1e-6
 """Of the differences' own variance: keeps the matrix from being singular at no width."""
-
-_WHITE = 1.5
-"""Mean square by which the mean of its neighbours misses a row of noise, of the noise's own."""
-
-_LEAST_ROWS = 3
 
 Found = TypeVar("Found", bound=Estimate)
 
@@ -55,66 +50,74 @@ def differences_of(size: int) -> FloatArray:
     return made
 
 
-def blur(parts: FloatArray) -> float:
-    """Share of the differences between motors that is lost between two rows, 0 … 1.
+def no_surer_than(plain: Estimate, found: Estimate) -> FloatArray:
+    """What makes the differences of an estimate no better known than by plain least squares.
 
     Parameters
     ----------
-    parts
-        What each motor draws, at the times it is told, shape (n, k).
+    plain
+        Least squares, whose covariance is made of blocks of time.
+    found
+        Of the same readings, with what wanders taken out: it knows the differences as well as its
+        model is right.
+
+    Returns
+    -------
+    ndarray
+        Stretches the deviations of the parameters, shape (size, size).
 
     Notes
     -----
-    By how well a row is told by its neighbours: not at all where the outputs are told more seldom
-    than the motors change. Then the differences come out too small by an unknown share.
-
-    Examples
-    --------
-    >>> slow, fast = np.sin(np.arange(100.0) / 20), np.array([1.0, -1.0] * 50)
-    >>> blur(np.column_stack([slow, -slow])) < 1e-4, blur(np.column_stack([fast, -fast]))
-    (True, 1.0)
+    A total current that is wrong while one motor works harder looks like a difference along the
+    motors' common vector. No model of wandering has that; in the sums over blocks it is.
     """
-    if len(parts) < _LEAST_ROWS:
-        return 1.0
-    apart = parts - parts.mean(axis=1, keepdims=True)
-    told = apart[1:-1] - (apart[:-2] + apart[2:]) / 2.0
-    whole = float(np.mean((apart - apart.mean(axis=0)) ** 2))
-    return min(1.0, (float(np.mean(told**2)) / (_WHITE * whole)) ** 2) if whole > 0.0 else 1.0
+    tell = differences_of(len(found.parameters))
+    surer = float(np.trace(tell @ found.covariance @ tell.T))
+    square = float(np.trace(tell @ plain.covariance @ tell.T))
+    longer = np.sqrt(square / surer) if square > surer > 0.0 else 1.0
+    return np.eye(len(found.parameters)) + (longer - 1.0) * tell.T @ tell
 
 
-def alike_where_unseen(found: Found, lost: float = 0.0) -> Found:
-    """The estimate with a prior that motors disturb alike, as wide as makes it likeliest.
+def alike_where_unseen(found: Found, stretch: FloatArray, unsure: float = 0.0) -> Found:
+    """The estimate with a prior that motors disturb alike, of every width that may be.
 
     Parameters
     ----------
     found
         Made without such a prior; its parameters end with the other motors' vectors.
-    lost
-        From :func:`blur`: the covariance is wider by this share of the differences.
+    stretch
+        From :func:`no_surer_than`. It widens what comes out, not what differences are weighed by:
+        those that one current's errors make are not smaller for being taken as alike.
+    unsure
+        As :class:`magcomp.model.Control` has it.
 
     Notes
     -----
-    The differences d = A·p are taken as 0 ± τ: a Kalman update of parameters and covariance. τ
-    maximises the density of the d that was found, N(0, A·C·Aᵀ + τ²).
+    The differences d = A·p are taken as 0 ± τ: a Kalman update of parameters and covariance. Each τ
+    counts by the density it gives the d that was found, N(0, A·C·Aᵀ + τ²), and the covariance
+    holds how far the answers of one τ and another lie apart.
     """
     tell = differences_of(len(found.parameters))
     apart, doubt = tell @ found.parameters, tell @ found.covariance @ tell.T
     usual = float(np.sqrt(np.median(np.diag(doubt))))
     if not usual > 0.0:
         return found
+    gain_of = found.covariance @ tell.T
     identity = np.eye(len(apart))
-
-    def unlikely(width: float) -> float:
+    density, moves, gains = [], [], []
+    for width in _WIDTHS * usual:
         whole = doubt + (width**2 + _SMALL * usual**2) * identity
-        return float(apart @ np.linalg.solve(whole, apart) + np.linalg.slogdet(whole)[1])
-
-    width = min(_WIDTHS * usual, key=unlikely)
-    whole = doubt + (width**2 + _SMALL * usual**2) * identity
-    gain = found.covariance @ tell.T @ np.linalg.inv(whole)
-    return replace(
-        found,
-        parameters=found.parameters - gain @ apart,
-        covariance=found.covariance
-        - gain @ tell @ found.covariance
-        + lost**2 * float(np.mean(apart**2)) * tell.T @ tell,
-    )
+        gain = np.linalg.solve(whole, gain_of.T).T
+        moves.append(gain @ apart)
+        gains.append(gain @ gain_of.T)
+        density.append(-0.5 * float(apart @ np.linalg.solve(whole, apart)))
+        density[-1] -= 0.5 * float(np.linalg.slogdet(whole)[1])
+    weights = np.exp(np.array(density) - max(density))
+    weights /= weights.sum()
+    move = weights @ np.array(moves)
+    off = np.array(moves) - move
+    covariance = found.covariance - np.tensordot(weights, np.array(gains), 1)
+    covariance += (off * weights[:, None]).T @ off
+    covariance = stretch @ covariance @ stretch.T
+    covariance += unsure**2 * float(np.mean(apart**2)) * tell.T @ tell
+    return replace(found, parameters=found.parameters - move, covariance=covariance)

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from magcomp.model import BoolArray, FloatArray, IntArray
+from magcomp.model import BoolArray, FloatArray, IntArray, median
 
 ROUNDS = 6
 """σ is re-estimated this often at most."""
@@ -32,6 +32,7 @@ _MAD_TO_STD = 1.4826
 _STEPS = 12
 _DAMPING_START = 1e-6
 _DAMPING_MOST = 1e3
+_ANOTHER = 0.9
 _GAP_S, _GAP_STEPS = 2.0, 5.0
 _NEGLIGIBLE = 1e-3
 """A gain of log-likelihood that no digit of the answer notices."""
@@ -210,7 +211,7 @@ def spread_of(values: FloatArray, floor: float = NOISE_FLOOR) -> FloatArray:
     >>> spread_of(np.array([[-1.0], [1.0], [-1.0], [1.0], [500.0]]), 0.1).round(4).tolist()
     [1.4826]
     """
-    return np.maximum(_MAD_TO_STD * np.median(np.abs(values), axis=0), floor)
+    return np.maximum(_MAD_TO_STD * median(np.abs(values)), floor)
 
 
 def _weights(z: FloatArray) -> FloatArray:
@@ -245,7 +246,7 @@ def _descend(
         hessian, gradient = _normal(values, slopes, weights, moving)
         hessian += np.diag(precision)
         gradient += precision * (parameters - prior.mean)[moving]
-        progress = False
+        progress, refused = False, np.inf
         while damping < _DAMPING_MOST:
             damped = hessian + damping * np.diag(np.diag(hessian) + 1e-12)
             step = np.zeros_like(parameters)
@@ -255,10 +256,13 @@ def _descend(
                 # Readings of one attitude and one control quantity leave a direction undetermined.
                 damping *= 10.0
                 continue
-            if -float(gradient @ step[moving]) < _NEGLIGIBLE:
+            promised = -float(gradient @ step[moving])
+            if promised < _NEGLIGIBLE:
                 break
             trial = parameters + step
-            if feasible(trial):
+            # A step that is hardly another than the last one is refused as that was.
+            if promised < _ANOTHER * refused and feasible(trial):
+                refused = promised
                 trial_values, trial_slopes = residuals(trial)
                 value = objective(trial, trial_values)
                 if value <= now:
@@ -309,7 +313,7 @@ def recorded_time(time: FloatArray) -> FloatArray:
     steps = np.diff(time)
     if not len(steps):
         return np.zeros(len(time))
-    longest = max(_GAP_S, _GAP_STEPS * float(np.median(steps)))
+    longest = max(_GAP_S, _GAP_STEPS * float(median(steps)))
     return np.concatenate([[0.0], np.cumsum(np.minimum(steps, longest))])
 
 

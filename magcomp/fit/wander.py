@@ -108,6 +108,11 @@ def stretches(time: FloatArray) -> IntArray:
     return np.unique(np.floor((time - time[0]) / length), return_inverse=True)[1]
 
 
+def starts_of(time: FloatArray) -> IntArray:
+    """First reading of each stretch."""
+    return np.asarray(np.flatnonzero(np.r_[True, np.diff(stretches(time)) != 0]))
+
+
 @dataclass(frozen=True, eq=False)
 class Rows:
     """Readings at some parameters.
@@ -138,7 +143,7 @@ def reduced(rows: Rows, weights: FloatArray) -> Reduced:
     weights
         One over the variance of each residual, shape (n, 2).
     """
-    starts = np.flatnonzero(np.r_[True, np.diff(stretches(rows.time)) != 0])
+    starts = starts_of(rows.time)
     slopes, values, pulls = rows.slopes.T, rows.values.T[np.newaxis], rows.pulls.T[np.newaxis]
     columns = np.concatenate([slopes, values, pulls])
     weighted = columns * weights.T
@@ -349,12 +354,16 @@ def weighed(rows: Rows) -> Reduced:
 
 def _weights(time: FloatArray, values: FloatArray) -> FloatArray:
     """One over the variance of each residual: white noise from neighbours, outliers less."""
+    return weights_and_rest(time, values)[0]
+
+
+def weights_and_rest(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Weights of residuals, and what of each its neighbours do not have too, shape (n, 2) both."""
     close = np.diff(time) < 2.0
     steps = np.diff(values, axis=0)[close] if close.any() else values
     white = spread_of(steps / np.sqrt(2.0))
-    centre = np.stack([_running_median(column) for column in values.T], axis=1)
-    far = (values - centre) / white
-    return np.asarray(1.0 / (1.0 + (far / _LOSS_SCALE) ** 2) / white**2)
+    left = values - np.stack([_running_median(column) for column in values.T], axis=1)
+    return np.asarray(1.0 / (1.0 + (left / white / _LOSS_SCALE) ** 2) / white**2), left
 
 
 def _running_median(values: FloatArray, half: int = 7) -> FloatArray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gc
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -12,7 +12,8 @@ import numpy as np
 
 from magcomp.fleet.row import VECTORS, Log, State
 from magcomp.fleet.run import Known, key
-from magcomp.model.recording import FloatArray
+from magcomp.fleet.store import listed, words_of
+from magcomp.model.recording import BoolArray, FloatArray, IntArray
 
 
 class Flight(NamedTuple):
@@ -95,55 +96,82 @@ def select(table: Any, logs: Sequence[Log], known: Known, since: float = -math.i
             wanted.setdefault(digest, log.path)
         elif digest is not None:
             lost.add(log.path)
-    flights: dict[tuple[str, int], Flight] = {}
-    unusable: dict[str, Flight] = {}
-    # A member of an enumeration is compared by a function of its own, a hundred thousand times.
-    copy, fitted, always = str(State.COPY), str(State.FITTED), since == -math.inf
-    for flight in _uncollected(table):
-        state, digest = flight.state, flight.digest
-        if state == copy:
-            continue
-        if not digest:
-            if flight.path in lost:
-                unusable[flight.path] = flight
-        elif digest in wanted and (always or not flight.when < since):
-            place = wanted[digest]
-            shown = flight if flight.path == place else flight._replace(path=place)
-            if state == fitted:
-                flights.setdefault((digest, flight.compass), shown)
-            else:
-                unusable.setdefault(digest, shown)
     copies = len(logs) - len(wanted) - len(lost)
-    ordered = sorted(flights.values(), key=lambda each: (each.when, each.path, each.compass))
+    rows = _Rows(table)
+    asked = rows.of(wanted) & ~(rows.when < since)
+    fitted = rows.first_of_each_compass(asked & rows.is_in(State.FITTED))
+    others = asked & ~rows.is_in(State.FITTED) & ~rows.is_in(State.COPY)
+    unusable: dict[str, Flight] = {}
+    for flight in _flights(table, np.flatnonzero(others)):
+        unusable.setdefault(flight.digest, flight._replace(path=wanted[flight.digest]))
+    for flight in _flights(table, np.flatnonzero(rows.of({""}) & ~rows.is_in(State.COPY))):
+        if flight.path in lost:
+            unusable[flight.path] = flight
     return Selected(
-        tuple(ordered), tuple(sorted(unusable.values(), key=lambda each: each.path)), copies
+        tuple(_flights(table, rows.in_order(fitted, wanted), wanted)),
+        tuple(sorted(unusable.values(), key=lambda each: each.path)),
+        copies,
     )
 
 
-def _uncollected(table: Any) -> list[Flight]:
-    """All flights, made without Python looking for circles among them again and again."""
+class _Rows:
+    """What chooses among the rows of a table, a hundred thousand at once."""
+
+    def __init__(self, table: Any) -> None:
+        start, modified = (table.column(name).to_numpy() for name in ("start_unix_s", "modified_s"))
+        self.when = np.where(np.isfinite(start), start, modified)
+        self._compass = table.column("compass").to_numpy()
+        self._digests, self._digest = words_of(table, "digest")
+        self._states, self._state = words_of(table, "state")
+
+    def of(self, digests: Collection[str]) -> BoolArray:
+        """Rows of these logs."""
+        return np.array([each in digests for each in self._digests], dtype=bool)[self._digest]
+
+    def is_in(self, state: State) -> BoolArray:
+        """Rows in a state."""
+        return np.array([each == str(state) for each in self._states], dtype=bool)[self._state]
+
+    def first_of_each_compass(self, which: BoolArray) -> IntArray:
+        """Indices of the first rows of each compass of each log, among some rows."""
+        rows = np.flatnonzero(which)
+        each = np.stack([self._digest[rows], self._compass[rows]])
+        _, first = np.unique(each, axis=1, return_index=True)
+        return rows[first]
+
+    def in_order(self, rows: IntArray, paths: Mapping[str, str]) -> IntArray:
+        """The same rows by time, then by path, then by compass."""
+        named = [paths.get(digest, "") for digest in self._digests]
+        rank = np.empty(len(named), dtype=np.intp)
+        rank[sorted(range(len(named)), key=named.__getitem__)] = np.arange(len(named))
+        keys = (self._compass[rows], rank[self._digest[rows]], self.when[rows])
+        return rows[np.lexsort(keys)]
+
+
+def _flights(
+    table: Any, rows: IntArray, paths: Mapping[str, str] | None = None
+) -> Sequence[Flight]:
+    """Some rows as flights, made without Python looking for circles among them again and again."""
+    if not len(rows):
+        return []
+    columns = {name: _column(table, name, rows) for name in Flight._fields}
+    if paths is not None:
+        columns["path"] = [paths[digest] for digest in columns["digest"]]
     enabled = gc.isenabled()
     gc.disable()
     try:
-        return list(_flights(table))
+        return list(map(Flight._make, zip(*columns.values(), strict=True)))
     finally:
         if enabled:
             gc.enable()
 
 
-def _flights(table: Any) -> Iterator[Flight]:
-    columns = [_column(table, name) for name in Flight._fields]
-    return map(Flight._make, zip(*columns, strict=True))
-
-
-def _column(table: Any, name: str) -> Sequence[Any]:
-    column = table.column(name).combine_chunks()
+def _column(table: Any, name: str, which: IntArray) -> Sequence[Any]:
     if name not in VECTORS:
-        listed: list[Any] = column.to_pylist()
-        return listed
-    flat = column.flatten().to_numpy(zero_copy_only=False)
+        return listed(table, name, which)
+    flat = table.column(name).combine_chunks().flatten().to_numpy(zero_copy_only=False)
     rows: Any = np.asarray(flat, dtype=np.float64).reshape(len(table), VECTORS[name])
-    return list(rows)
+    return list(rows[which])
 
 
 def by(flights: Sequence[Flight], name: str) -> Mapping[Any, list[Flight]]:

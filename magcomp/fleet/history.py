@@ -103,11 +103,8 @@ class _Compared:
     usable: Sequence[int]
     motors: FloatArray
     covariances: FloatArray
-
-    @property
-    def at(self) -> float:
-        """Largest control quantity of its flights."""
-        return max(self.flights[i].u_high for i in self.usable)
+    at: float
+    """Largest control quantity of its flights."""
 
     @property
     def shift(self) -> Callable[[FloatArray], FloatArray]:
@@ -196,7 +193,8 @@ def _compared(slot: int, device_id: int, flights: Sequence[Flight]) -> _Compared
     if not sound.any():
         return None
     usable = [i for i, good in zip(asked, sound.tolist(), strict=True) if good]
-    return _Compared(slot, device_id, flights, usable, motors[sound], covariances[sound])
+    at = max([flights[i].u_high for i in usable])
+    return _Compared(slot, device_id, flights, usable, motors[sound], covariances[sound], at)
 
 
 def _untold(

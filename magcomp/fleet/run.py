@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from magcomp.fleet.row import Log, Row, State, without_fit
-from magcomp.fleet.store import Store
+from magcomp.fleet.store import Store, listed
 from magcomp.fleet.task import Outcome, Task
 
 _ROWS_A_FILE = 200
@@ -40,12 +40,13 @@ def known_of(store: Store) -> Known:
     names = ["path", "size", "stamp", "digest", "state"]
     # A log has a row a compass, and they say the same of it.
     table = store.read(names).group_by(names, use_threads=False).aggregate([])
-    columns = [table.column(name).to_pylist() for name in names]
+    columns = [listed(table, name) for name in names]
+    gone = str(State.LOST)  # a member of an enumeration is compared by a function of its own
     digests: dict[tuple[str, int, str], str] = {}
     by_size: dict[int, set[str]] = {}
     lost = set()
     for path, size, stamp, digest, state in zip(*columns, strict=True):
-        if state == State.LOST:
+        if state == gone:
             lost.add((path, size, stamp))
             continue
         digests[path, size, stamp] = digest

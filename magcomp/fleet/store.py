@@ -9,6 +9,9 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from magcomp import __version__
 from magcomp.errors import OutputError, UsageError
 from magcomp.fleet.row import VECTORS, Row
@@ -125,6 +128,27 @@ class Store:
             raise OutputError(
                 f"{self.folder} must be a folder that can be written; instead received: {error}"
             ) from error
+
+
+def words_of(table: Any, name: str) -> tuple[list[str], NDArray[np.intp]]:
+    """The different words of a column of text, and which of them stands in each row."""
+    encoded = table.column(name).combine_chunks().dictionary_encode()
+    return encoded.dictionary.to_pylist(), encoded.indices.to_numpy().astype(np.intp)
+
+
+def listed(table: Any, name: str, rows: NDArray[np.intp] | None = None) -> list[Any]:
+    """A column of some rows as a list; those that say the same share one text, made only once."""
+    column = table.column(name)
+    pa, _ = arrow()
+    if pa.types.is_string(column.type):
+        words, which = words_of(table, name)
+        found = np.array([*words, None], dtype=object)
+        chosen = which if rows is None else which[rows]
+        shared: list[Any] = found[chosen].tolist()
+        return shared
+    values = column.to_numpy()
+    plain: list[Any] = (values if rows is None else values[rows]).tolist()
+    return plain
 
 
 def table_of(rows: Iterable[Row]) -> Any:

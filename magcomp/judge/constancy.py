@@ -9,6 +9,7 @@ its own standard error (docs/method.md, The judge).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -78,7 +79,17 @@ class Departure:
 
 @dataclass(frozen=True, eq=False)
 class _Linear:
-    """Residuals and slopes at the fit, weighted; what more columns are put beside."""
+    """Residuals and slopes at the fit, weighted; what more columns are put beside.
+
+    Attributes
+    ----------
+    residuals, slopes
+        Shapes (2, n) and (k, 2, n).
+    precision
+        Of the prior, shape (k,).
+    blocks
+        Where each block begins, shape (b,).
+    """
 
     residuals: FloatArray
     slopes: FloatArray
@@ -86,45 +97,43 @@ class _Linear:
     blocks: IntArray
 
     def taken_up(self, extra: FloatArray, width: float) -> tuple[FloatArray, FloatArray, float]:
-        """What ``extra`` columns (n, 2, m) take up, shape (m,), its covariance, and the gain.
+        """What ``extra`` columns (m, 2, n) take up, shape (m,), its covariance, and the gain.
 
         ``width`` is what the columns may reasonably take, so that a direction the readings do not
         show stays at zero instead of running away. Neighbouring readings err alike: they count
         for as many fewer as their summed scores scatter more than single ones do.
         """
-        columns = np.concatenate([self.slopes, extra], axis=2)
-        size, more = columns.shape[2], extra.shape[2]
-        flat = columns.reshape(-1, size)
-        alike = self._alike()
-        information = flat.T @ flat / alike
+        columns = np.concatenate([self.slopes, extra])
+        size, more = len(columns), len(extra)
+        flat = columns.reshape(size, -1)
+        information = flat @ flat.T / self._alike
         precision = np.concatenate([self.precision, np.full(more, 1.0 / width**2)])
         bread = np.linalg.pinv(information + np.diag(precision), hermitian=True)
-        found = -bread @ (flat.T @ self.residuals.reshape(-1)) / alike
-        left = self.residuals + columns @ found
-        summed = self._summed(columns, left) / alike
-        count = len(summed)
-        meat = summed.T @ summed * (count / max(count - size, 1) if count > size else 1.0)
+        found = -bread @ (flat @ self.residuals.reshape(-1)) / self._alike
+        left = self.residuals + np.tensordot(found, columns, axes=1)
+        summed = self._summed(columns, left) / self._alike
+        count = len(self.blocks)
+        meat = summed @ summed.T * (count / max(count - size, 1) if count > size else 1.0)
         covariance = bread @ np.diag(precision) @ bread + _larger(
             bread @ meat @ bread, bread @ information @ bread
         )
-        gain = float(np.sum(self.residuals**2) - np.sum(left**2)) / alike
+        gain = float(np.sum(self.residuals**2) - np.sum(left**2)) / self._alike
         return found[-more:], covariance[-more:, -more:], gain
 
+    @cached_property
     def _alike(self) -> float:
         """How many neighbouring readings say the same thing, on the whole."""
-        size = self.slopes.shape[2]
-        flat = self.slopes.reshape(-1, size)
-        bread = np.linalg.pinv(flat.T @ flat + np.diag(self.precision), hermitian=True)
-        left = self.residuals - self.slopes @ (bread @ (flat.T @ self.residuals.reshape(-1)))
+        flat = self.slopes.reshape(len(self.slopes), -1)
+        bread = np.linalg.pinv(flat @ flat.T + np.diag(self.precision), hermitian=True)
+        found = bread @ (flat @ self.residuals.reshape(-1))
+        left = self.residuals - np.tensordot(found, self.slopes, axes=1)
         summed = self._summed(self.slopes, left)
-        single = np.einsum("ngi,ng->ni", self.slopes, left)
-        ratio = np.trace(bread @ summed.T @ summed) / max(np.trace(bread @ single.T @ single), 1e-9)
+        single = np.sum(self.slopes * left, axis=1)
+        ratio = np.trace(bread @ summed @ summed.T) / max(np.trace(bread @ single @ single.T), 1e-9)
         return float(max(ratio, 1.0))
 
     def _summed(self, columns: FloatArray, residuals: FloatArray) -> FloatArray:
-        scores = np.einsum("ngi,ng->ni", columns, residuals)
-        starts = np.flatnonzero(np.r_[True, np.diff(self.blocks) != 0])
-        return np.asarray(np.add.reduceat(scores, starts, axis=0))
+        return np.asarray(np.add.reduceat(np.sum(columns * residuals, axis=1), self.blocks, axis=1))
 
 
 def _larger(first: FloatArray, second: FloatArray) -> FloatArray:
@@ -150,18 +159,19 @@ def departures_of(problem: Problem, fit: MotorFit, lags: Lags) -> tuple[Departur
     top = float(np.quantile(samples.total, 0.98))
     if top <= 0.0:
         return ()
-    weight = linear.slopes[:, :, OFFSET], motor_columns(linear.slopes).sum(axis=2) / top
-    share = np.clip(samples.total / top, 0.0, 2.0)[:, None, None]
+    weight = linear.slopes[OFFSET], motor_columns(linear.slopes).sum(axis=0) / top
+    share = np.clip(samples.total / top, 0.0, 2.0)
     wide = _WIDEST * fit.strength
     curved, covariance, gain = linear.taken_up(weight[1] * share, wide)
     # The bow of q·s² over 0 … 1 departs from its best line by q/8.
     found = [_departure("curve", curved / 8, covariance / 64, gain, horizontal, np.nan)]
     steps = [samples.time > t for t in np.quantile(samples.time, _SPLITS)]
     moments = np.quantile(samples.time, _SPLITS)
-    earth = linear.slopes[:, :, [STRENGTH, SIN_DIP]] * np.array([1.0, 1.0 / fit.strength])
+    earth = linear.slopes[[STRENGTH, SIN_DIP]]
+    earth[1] /= fit.strength
     for kind, columns in (("step", weight[0]), ("motors", weight[1]), ("place", earth)):
         tried = [
-            _departure(kind, *linear.taken_up(columns * late[:, None, None], wide), horizontal, t)
+            _departure(kind, *linear.taken_up(columns * late, wide), horizontal, t)
             for late, t in zip(steps, moments.tolist(), strict=True)
         ]
         found.append(max(tried, key=lambda d: d.gain))
@@ -175,10 +185,10 @@ def _weighted(problem: Problem, values: FloatArray, slopes: FloatArray) -> _Line
     root = np.sqrt(weight) / spread
     known = prior(problem, 4).precision
     return _Linear(
-        residuals=values * root,
-        slopes=slopes * root[:, :, None],
+        residuals=(values * root).T,
+        slopes=slopes.T * root.T,
         precision=known,
-        blocks=drift_blocks(problem.readings.time),
+        blocks=np.flatnonzero(np.diff(drift_blocks(problem.readings.time), prepend=-1)),
     )
 
 
@@ -210,10 +220,10 @@ def _wander(linear: _Linear, time: FloatArray, columns: FloatArray, horizontal: 
     sizes, errors = [], []
     for number in np.unique(block):
         rows = block == number
-        flat = columns[rows].reshape(-1, 3)
-        normal = flat.T @ flat + np.eye(3) / (3 * _USUAL_DRIFT_MGAUSS) ** 2
+        flat = columns[:, :, rows].reshape(3, -1)
+        normal = flat @ flat.T + np.eye(3) / (3 * _USUAL_DRIFT_MGAUSS) ** 2
         inverse = np.linalg.inv(normal)
-        vector = -inverse @ (flat.T @ linear.residuals[rows].reshape(-1))
+        vector = -inverse @ (flat @ linear.residuals[:, rows].reshape(-1))
         sizes.append(float(vector @ vector))
         errors.append(float(np.trace(inverse)) + 3 * _USUAL_DRIFT_MGAUSS**2)
     excess = max(float(np.mean(sizes)) - float(np.mean(errors)), 0.0)

@@ -7,7 +7,7 @@ import numpy as np
 from magcomp.errors import FitRejectedError
 from magcomp.fit import Problem, departures, folds, refit, residuals, spread
 from magcomp.geometry import heading
-from magcomp.model import Coverage, FieldResidual, FloatArray, Lags, MotorFit, Samples
+from magcomp.model import Coverage, FieldResidual, FloatArray, Lags, MotorFit, Samples, median
 
 _SPHERE_BANDS, _SPHERE_SECTORS = 6, 12
 _HEADING_SECTORS = 24
@@ -80,7 +80,7 @@ def _left_before(fit: MotorFit, seen: Samples, unseen: Samples) -> FloatArray:
     """The same with the correction in force and the constants that suit it best."""
     if fit.method == "sweep":
         return np.asarray(unseen.present - np.median(seen.present, axis=0))
-    middle = np.median(departures(seen.present, seen.down, 0.0, 0.0), axis=0)
+    middle = median(departures(seen.present, seen.down, 0.0, 0.0))
     return departures(unseen.present, unseen.down, float(middle[0]), float(middle[1]))
 
 

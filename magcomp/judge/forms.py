@@ -31,6 +31,7 @@ from magcomp.model import (
     Correction,
     FloatArray,
     Form,
+    IntArray,
     MotorFit,
     Samples,
     Series,
@@ -146,19 +147,39 @@ def _tried(name: str, problem: Problem, fit: MotorFit, base: Control | None = No
     moving = known.width > 0.0
     precision = np.diag(known.precision[moving])
 
-    def solved(rows: BoolArray) -> FloatArray:
-        flat = (slopes[rows][:, :, moving] * root[rows][:, :, None]).reshape(-1, moving.sum())
-        left = (values[rows] * root[rows]).reshape(-1)
+    rooted = slopes.T[moving] * root.T
+    left = values.T * root.T
+    fold = folds(samples.time)
+    each = [_normal(rooted[:, :, here], left[:, here]) for here in _parts(fold)]
+    whole = (
+        np.sum([matrix for matrix, _ in each], axis=0),
+        np.sum([side for _, side in each], axis=0),
+    )
+
+    def solved(matrix: FloatArray, side: FloatArray) -> FloatArray:
         step = np.zeros(len(start))
         # A form that the readings do not determine is solved as far as they do.
-        step[moving] = -np.linalg.pinv(flat.T @ flat + precision, hermitian=True) @ flat.T @ left
+        step[moving] = -np.linalg.pinv(matrix + precision, hermitian=True) @ side
         return step
 
-    fold = folds(samples.time)
-    parts = [fold == index for index in np.unique(fold) if np.any(fold != index)]
-    unseen = np.concatenate([values[here] + slopes[here] @ solved(~here) for here in parts])
-    found = correction_at(start + solved(np.ones(len(samples), dtype=bool)))
+    unseen = np.concatenate(
+        [
+            values[here] + slopes[here] @ solved(whole[0] - matrix, whole[1] - side)
+            for here, (matrix, side) in zip(_parts(fold), each, strict=True)
+        ]
+    )
+    found = correction_at(start + solved(*whole))
     return _Tried(name, found.motor.size, spread(unseen), found.added(samples.u), samples.u)
+
+
+def _parts(fold: IntArray) -> list[BoolArray]:
+    return [fold == index for index in np.unique(fold)]
+
+
+def _normal(rooted: FloatArray, left: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Information matrix and right side of a part, from columns (m, 2, n) and residuals (2, n)."""
+    flat = rooted.reshape(len(rooted), -1)
+    return flat @ flat.T, flat @ left.reshape(-1)
 
 
 def _begun(correction: Correction, name: str, samples: Samples) -> Correction:

@@ -100,6 +100,8 @@ class View:
         Heading error that the newest analysis promises not to be exceeded (95 %), degrees.
     was_enough
         It was enough before; data do not become fewer.
+    answered
+        The newest analysis has all that was recorded before the motors were switched off.
     """
 
     situation: Situation
@@ -113,6 +115,7 @@ class View:
     stable_refits: int = 0
     bound_deg: float = 0.0
     was_enough: bool = False
+    answered: bool = True
 
 
 __all__ = [
@@ -221,9 +224,12 @@ def _guide_flight(view: View) -> Guidance:
     turns, climbs, *_ = shares.values()
     share = float(np.mean(list(shares.values())))
     missing = _missing(shares)
-    if not missing and is_settled(view):
+    landed = view.armed is False and view.answered and view.grade is Grade.GOOD
+    if landed or (not missing and is_settled(view)):
         return Guidance(_ending(view), 1.0, enough=True)
-    if not view.armed:
+    if not view.armed and not view.answered:
+        text = "wait for the answer: the whole flight is being fitted"
+    elif not view.armed:
         text = "this flight was not enough: fly once more with turns and climbs"
     elif turns < 1.0 and turns <= climbs:
         text = _turn(view)

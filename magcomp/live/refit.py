@@ -47,6 +47,8 @@ class Refit:
         Why the last attempt gave none; empty where it did.
     full, refreshed
         How many of each were done.
+    hurried
+        How many full ones were done because somebody waited for them.
     full_cost_s, refresh_cost_s
         Processor seconds of the last of each.
     """
@@ -57,6 +59,7 @@ class Refit:
     trouble: str = ""
     full: int = 0
     refreshed: int = 0
+    hurried: int = 0
     full_cost_s: float = 0.0
     refresh_cost_s: float = 0.0
 
@@ -88,6 +91,8 @@ class Refitter:
         self._state = Refit()
         self._full_at = -math.inf
         self._stop = threading.Event()
+        self._hurry = threading.Event()
+        self._wake = threading.Event()
         self._thread = threading.Thread(target=self._run, name="magcomp-refit", daemon=True)
         self._thread.start()
 
@@ -96,16 +101,24 @@ class Refitter:
         """How it stands now."""
         return self._state
 
+    def hurry(self) -> None:
+        """Make a full analysis at once, of all there is by now: somebody waits for it."""
+        self._hurry.set()
+        self._wake.set()
+
     def close(self) -> None:
         """End after the fit under way."""
         self._stop.set()
+        self._wake.set()
         self._thread.join()
 
     def _run(self) -> None:
         pause = LEAST_PAUSE_S
-        while not self._stop.wait(pause):
+        while not self._waited(pause):
             begun, cpu = time.monotonic(), time.thread_time()
-            full = self._state.analysis is None or self._full_is_due(begun)
+            hurried = self._hurry.is_set()
+            self._hurry.clear()
+            full = hurried or self._state.analysis is None or self._full_is_due(begun)
             try:
                 state = self._analysed() if full else self._refreshed()
             except Exception as error:
@@ -113,12 +126,18 @@ class Refitter:
             cost = time.thread_time() - cpu
             if full:
                 self._full_at = begun
-                self._state = replace(state, full_cost_s=cost)
+                self._state = replace(state, full_cost_s=cost, hurried=state.hurried + hurried)
             else:
                 self._state = replace(state, refresh_cost_s=cost)
             pause = max(LEAST_PAUSE_S, self._state.refresh_cost_s / self._refresh_share)
             if self._state.analysis is None:
                 pause = max(pause, cost / self._full_share)
+
+    def _waited(self, seconds: float) -> bool:
+        """Rest, unless somebody is in a hurry; tell whether it is over."""
+        self._wake.wait(seconds)
+        self._wake.clear()
+        return self._stop.is_set()
 
     def _full_is_due(self, now: float) -> bool:
         return (now - self._full_at) * self._full_share >= self._state.full_cost_s

@@ -91,7 +91,9 @@ class LiveSession:
         self._stop = threading.Event()
         self._refits = (options, refit_share)
         self._refitter: Refitter | None = None
-        self._watch = Watch(connection, tap, self._preparation, clock, lambda: self.refit)
+        self._watch = Watch(
+            connection, tap, self._preparation, clock, lambda: self.refit, self._hurry
+        )
         self._threads = [
             threading.Thread(target=work, name=f"magcomp-{name}", daemon=True)
             for name, work in (
@@ -394,6 +396,12 @@ class LiveSession:
             self._refitter = Refitter(self.recording, options, share=share)
 
     # ---------------------------------------------------------------- inside
+
+    def _hurry(self) -> bool:
+        if self._refitter is None or not self._tap.taking:
+            return False
+        self._refitter.hurry()
+        return True
 
     def _known_vehicle(self) -> Vehicle:
         vehicle = self.connection.vehicle

@@ -54,6 +54,8 @@ class Watch:
         The computer's clocks.
     refit
         How the fitting stands.
+    hurry
+        Has everything fitted at once; tells whether anybody fits.
     """
 
     def __init__(
@@ -63,12 +65,16 @@ class Watch:
         preparation: Preparation,
         clock: Clock,
         refit: Callable[[], Refit],
+        hurry: Callable[[], bool],
     ) -> None:
         self._connection = connection
         self._tap = tap
         self._preparation = preparation
         self._clock = clock
         self._refit = refit
+        self._hurry = hurry
+        self._was_armed = False
+        self._wanted = 0
         self._opened = clock.monotonic()
         self._situation = SituationWatch()
         self._ring = HeadingRing()
@@ -108,6 +114,15 @@ class Watch:
         self._ring.look(now.armed, now.attitude, now.throttle)
         loads = {CURRENT: now.current, THROTTLE: now.throttle}
         self._hover.look(now.armed, loads, self._refit().analysis, seconds)
+        self._look_for_landing(now.armed)
+
+    def _look_for_landing(self, armed: bool | None) -> None:
+        """Whoever has landed waits for the answer: fit the whole flight at once."""
+        if self._was_armed and armed is False:
+            wanted = self._refit().hurried + 1
+            self._wanted = wanted if self._hurry() else 0
+        if armed is not None:
+            self._was_armed = armed
 
     @property
     def elapsed_s(self) -> float:
@@ -192,6 +207,7 @@ class Watch:
             stable_refits=refit.stable,
             bound_deg=largest_bound(refit.analysis),
             was_enough=self._enough.reached(self._situation.situation),
+            answered=refit.hurried >= self._wanted,
         )
 
     def _guidance(self, vehicle: Vehicle | None, view: View) -> Guidance:

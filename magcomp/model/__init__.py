@@ -23,7 +23,7 @@ from magcomp.model.fit import (
     unpack,
 )
 from magcomp.model.forms import AsWritten, Form
-from magcomp.model.numbers import as_floats
+from magcomp.model.numbers import as_floats, median
 from magcomp.model.parameters import ParameterSet
 from magcomp.model.quantity import (
     CURRENT,
@@ -106,6 +106,7 @@ __all__ = [
     "as_floats",
     "compasses_of",
     "interpolate",
+    "median",
     "pack",
     "quantity_of",
     "running_mean",

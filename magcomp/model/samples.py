@@ -107,12 +107,16 @@ class Control:
         In words: which messages it was made of.
     numbers
         Of which motor each part is, as the firmware counts them; empty where there is one part.
+    unsure
+        Standard error of the size of the parts' differences, as a share of it: how they went
+        between the times they were told at is not known.
     """
 
     kind: str
     series: Series
     origin: str
     numbers: tuple[int, ...] = ()
+    unsure: float = 0.0
 
     @cached_property
     def blurred(self) -> Series:

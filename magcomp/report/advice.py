@@ -10,7 +10,7 @@ from typing import Any
 from magcomp import autopilots
 from magcomp.analysis import Options
 from magcomp.report import plain, words
-from magcomp.report.roles import roles
+from magcomp.report.roles import WRITE_IT, roles
 
 GRADES = ("good", "marginal", "rejected")
 
@@ -52,7 +52,7 @@ def steps(document: Document, options: Options | None = None) -> tuple[str, ...]
             *(_doubt(c, "") for c in document["compasses"] if c["verdict"] == "rejected"),
         )
     switch = autopilots.named(document["vehicle"]["autopilot"]).switch
-    every = list(_each(document))
+    every = list(_each(document, apart_from=WRITE_IT))
     leads = 1 if every and any(role.leads for role in roles(document)) else 0
     found = [*every[:leads], _write(document, sorted(kept), options), *every[leads:]]
     for compass in document["compasses"]:
@@ -67,11 +67,16 @@ def steps(document: Document, options: Options | None = None) -> tuple[str, ...]
     return tuple(found)
 
 
-def _each(document: Document) -> Iterator[str]:
-    """What to do with each compass where there are several, first with the one flown on."""
+def _each(document: Document, apart_from: str = "") -> Iterator[str]:
+    """What to do with each compass where there are several, first with the one flown on.
+
+    Of the others it is not said where it is just what another step says for all.
+    """
     every = roles(document)
     if len(every) > 1:
         for role in every:
+            if role.action == apart_from and not role.leads:
+                continue
             use = f", {role.use}" if role.use else ""
             who = f"Your vehicle flies on compass {role.compass}"
             yield f"{who if role.leads else f'Compass {role.compass}{use}'}: {role.action}."

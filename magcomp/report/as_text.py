@@ -92,8 +92,26 @@ def analysis_text(
     )
 
 
-def check_text(recording: Recording, verdicts: Mapping[int, Verdict], kind: str, look: Look) -> str:
-    """What ``magcomp check`` prints; ``kind`` is the control quantity of the table."""
+def check_text(
+    recording: Recording,
+    verdicts: Mapping[int, Verdict],
+    kind: str,
+    look: Look,
+    asked: int | None = None,
+) -> str:
+    """What ``magcomp check`` prints.
+
+    Parameters
+    ----------
+    recording, verdicts
+        Of the log.
+    kind
+        The control quantity of the table.
+    look
+        Width and colour.
+    asked
+        The one compass that was asked for, if one was.
+    """
     parts: list[RenderableType] = [
         *_first_lines([plain.check_line(verdicts, kind)]),
         *_whose(recording.source, recording.vehicle, recording.duration_s),
@@ -102,7 +120,24 @@ def check_text(recording: Recording, verdicts: Mapping[int, Verdict], kind: str,
     parts.extend(_findings(results, ("in force", "at most (95 %)"), ("red", "yellow")))
     parts.append(Text())
     parts.append(tables.check(verdicts, kind))
-    return render(parts, look)
+    return render([*parts, *_not_judged(recording, verdicts, asked)], look)
+
+
+def _not_judged(
+    recording: Recording, verdicts: Mapping[int, Verdict], asked: int | None
+) -> Iterator[RenderableType]:
+    """The compasses of which too much is missing, where others were judged."""
+    left = sorted(recording.field.keys() - verdicts.keys()) if asked is None else []
+    if left:
+        many = words.compasses(left)
+        yield Text()
+        yield Padding(
+            Text(
+                f"Not judged: {many}, of which the log holds too little; magcomp check --compass "
+                f"{left[0]} says what."
+            ),
+            (0, 1),
+        )
 
 
 def truth_text(source: str, rows: Sequence[tuple[float, float, float]], look: Look) -> str:
@@ -227,8 +262,9 @@ def _findings(
         yield Padding(title, (0, 0, 0, 1))
         for reason in first.reasons:
             yield Padding(Text(words.sentence(reason)), (0, 1, 0, 3))
-        yield Text()
-        yield bars("heading error", columns, list(_rows(first)), styles)
+        if rows := list(_rows(first)):
+            yield Text()
+            yield bars("heading error", columns, rows, styles)
         covered, table = first.verdict.coverage, first.verdict.heading_error
         low, high = (words.quantity(u, first.regressor) for u in (covered.u_low, covered.u_high))
         if not all(words.is_flown(row.u, covered.u_low, covered.u_high) for row in table):

@@ -12,6 +12,8 @@ from magcomp.report import plain, words
 
 Document = Mapping[str, Any]
 
+WRITE_IT = "write its numbers"
+
 _LESS_DISTURBED = 0.5
 """A compass whose motors add less than this share of another's deserves its place."""
 
@@ -97,7 +99,7 @@ def _action(
     ]
     if answer == plain.REFUSE:
         return "; ".join(_mend(others, used=used, is_first=number == first))
-    do = "write its numbers" if answer == plain.WRITE else "keep it as it is"
+    do = WRITE_IT if answer == plain.WRITE else "keep it as it is"
     return "; ".join([do, *_place(number, judged, others, first)])
 
 

@@ -26,6 +26,12 @@ _THRUST_TOPIC_ALONE = (1, 14)
 
 _EARLIEST_UTC_US = 1.0e15
 
+_PLACES = {
+    ("latitude_deg", "longitude_deg", "altitude_msl_m"): (1.0, 1.0, 1.0),
+    ("lat", "lon", "alt"): (1e-7, 1e-7, 1e-3),
+}
+"""Fields of a receiver's position, of newer and older firmware, and what one is in °, ° and m."""
+
 
 @dataclass(frozen=True, eq=False)
 class Quantities:
@@ -180,12 +186,10 @@ class Quantities:
             value = np.stack([topic.number(name) for name in ("lat", "lon", "alt")], axis=1)
             return _series(self._time(topic), value, _on_earth(value))
         for topic in self._receivers():
-            if "latitude_deg" in topic:
-                names, units = ("latitude_deg", "longitude_deg", "altitude_msl_m"), (1.0, 1.0, 1.0)
-            elif "lat" in topic:
-                names, units = ("lat", "lon", "alt"), (1e-7, 1e-7, 1e-3)
-            else:
+            forms = (names for names in _PLACES if all(name in topic for name in names))
+            if (names := next(forms, None)) is None:
                 continue
+            units = _PLACES[names]
             value = np.stack([topic.number(name) for name in names], axis=1) * units
             fixed = topic.number("fix_type") >= _FIX_3D
             found = _series(self._time(topic), value, fixed & _on_earth(value))

@@ -10,6 +10,7 @@ import numpy as np
 from magcomp.model import CompassResult, FloatArray
 from magcomp.report import words
 from magcomp.report.evidence import CompassPlots
+from magcomp.report.plain import is_no_better
 from magcomp.report.shift import Shift, shift_of
 
 AXIS_WORDS = ("forward", "right", "down")
@@ -36,6 +37,16 @@ class ErrorRow:
     after: float
     bound: float
     covered: bool
+
+    @property
+    def floor(self) -> float:
+        """What is in force cannot be told from the fit below this, degrees; else 0."""
+        return self.bound if is_no_better({"before": self.before, "p95": self.bound}) else 0.0
+
+    @property
+    def now(self) -> str:
+        """What is in force, in figures; a bound where it is no better known."""
+        return f"≤{self.floor:.1f}" if self.floor else f"{self.before:.1f}"
 
 
 def error_rows(result: CompassResult) -> tuple[ErrorRow, ...]:

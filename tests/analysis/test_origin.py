@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 
-import magpylib
 import numpy as np
 import pytest
 from synthetic import Flown
@@ -26,6 +25,8 @@ def leads(way_deg, below_m, beside_m, apart_m=None):
 
     It runs at an angle off the nose, so far below the compass and so far to its own right.
     """
+    import magpylib  # noqa: PLC0415 - it brings matplotlib along, which only these tests need
+
     way = np.array([np.cos(np.radians(way_deg)), np.sin(np.radians(way_deg)), 0.0])
     side = np.array([-way[1], way[0], 0.0])
     place = beside_m * side + np.array([0.0, 0.0, below_m])
@@ -72,6 +73,8 @@ def test_a_pair_of_leads_lies_in_the_range_and_is_halved_where_it_says(apart, di
 
 @pytest.mark.parametrize("distance", [0.08, 0.15])
 def test_a_loop_lies_in_its_range(distance):
+    import magpylib  # noqa: PLC0415
+
     side = np.sqrt(0.002)
     loop = magpylib.current.Circle(current=AMPERE, diameter=2 * np.sqrt(0.002 / np.pi))
     found = origin_of(1e7 * loop.getB([0.0, 0.0, distance]))

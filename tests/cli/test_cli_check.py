@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 import json
+from pathlib import Path
 
 import pytest
-from logs_made_of_logs import FIXTURES, FLIGHT
+from logs_made_of_logs import FIXTURES, FLIGHT, SWEEP, frames
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from magcomp.cli.app import run
 
@@ -36,3 +39,22 @@ def test_the_text_says_the_verdict_in_words(capsys: pytest.CaptureFixture[str]) 
     assert "REJECTED  compass 2" in out
     assert "in force" in out
     assert max(map(len, out.replace(str(FLIGHT), "").splitlines())) <= 80
+
+
+def test_a_compass_of_which_too_little_is_there_does_not_keep_the_others_from_being_judged(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    log = tmp_path / "one-falls-silent.tlog"
+    few = itertools.count()
+    kept = (
+        each
+        for each in frames(SWEEP)
+        if each.message != dialect.MAVLINK_MSG_ID_SCALED_IMU2 or next(few) < 20
+    )
+    log.write_bytes(b"".join(each.packed() for each in kept))
+    assert run(["check", str(log)]) == 1
+    out = capsys.readouterr().out
+    assert "REJECTED  compass 1" in out.replace("compasses 1 and 3", "compass 1")
+    assert "Not judged: compass 2" in out
+    assert run(["check", str(log), "--compass", "2"]) > 1
+    assert "Compass 2 must have at least 60" in capsys.readouterr().err

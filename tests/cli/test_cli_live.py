@@ -9,13 +9,15 @@ import socket
 import subprocess
 import sys
 import threading
+from functools import partial
 
 import pytest
-from live_vehicle import COMPENSATION, PATIENCE_S, alive, free_port, held, landed
+from live_vehicle import COMPENSATION, PATIENCE_S, RATES, alive, free_port, held, landed
 from logs_made_of_logs import SWEEP
 
 from magcomp.cli.app import run
 from magcomp.errors import ExitCode
+from magcomp.live.session import LiveSession
 from magcomp.model import ParameterSet
 from magcomp.sources.tlog import read_tlog
 from magcomp.writing.files import read_parameter_file, write_parameter_file
@@ -230,10 +232,11 @@ def test_record_leaves_a_log_that_can_be_read(tmp_path, capsys):
 
 
 def test_calibrate_guides_ends_when_the_pilot_disarms_fits_and_writes(
-    tmp_path, data_directory, capsys
+    tmp_path, data_directory, capsys, monkeypatch
 ):
+    monkeypatch.setattr(LiveSession, "open", partial(LiveSession.open, rates=RATES))
     answer, log = tmp_path / "a.param", tmp_path / "a.tlog"
-    with alive("sweep", speed=16.0) as flown:
+    with alive("sweep", speed=20.0) as flown:
         options = ("-o", answer, "--record", log, "--system", 1, "--upload", "--yes")
         assert magcomp("calibrate", flown.address, *options) == ExitCode.GOOD
         found = read_parameter_file(answer).values
@@ -244,7 +247,7 @@ def test_calibrate_guides_ends_when_the_pilot_disarms_fits_and_writes(
     assert "the vehicle is disarmed" in err
     assert "0 → 2" in out
     assert "Written and read back" in err
-    assert magcomp("fit", log) == ExitCode.GOOD
+    assert magcomp("fit", log, "--compass", 1) == ExitCode.GOOD
 
 
 def test_calibrate_prints_the_object_of_fit_and_nothing_else(tmp_path, capsys):

@@ -214,10 +214,10 @@ class TestErrors:
 
     def test_a_signal_at_work_ends_with_130(self) -> None:
         source = (
-            "import os, signal\n"
+            "import signal, time\n"
             "import magcomp.cli.fit as fit\n"
             "from magcomp.cli.app import main\n"
-            "fit.fit_log = lambda *_: os.kill(os.getpid(), signal.SIGINT)\n"
+            "fit.fit_log = lambda *_: (signal.raise_signal(signal.SIGINT), time.sleep(60))\n"
             f"main(['fit', {str(SWEEP)!r}])\n"
         )
         code, _, err = python("-c", source)

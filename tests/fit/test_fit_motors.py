@@ -12,7 +12,9 @@ from unequal import VECTORS, Unequal
 
 from magcomp.align import controls, currents_of_motors, readings, to_undo
 from magcomp.fit import Problem, best_form, fit
-from magcomp.fit.motors import contrasts
+from magcomp.fit.field_model import SIZE
+from magcomp.fit.motors import contrasts, differences_of, no_surer_than
+from magcomp.fit.robust import Estimate
 from magcomp.judge import judge
 from magcomp.judge.forms import forms, left_deg
 from magcomp.model import CURRENT, Lags
@@ -133,3 +135,27 @@ def test_motors_that_the_flight_does_not_tell_apart_are_taken_as_alike():
     spread = np.ptp(found.correction.motor, axis=1).max()
     assert doubt > 0.2
     assert spread < 0.5 * doubt
+
+
+def test_a_difference_that_the_flight_does_not_show_is_not_known_to_be_nothing():
+    problem = problem_of(Unequal(seed=1), motors=True)
+    alike = problem.control.series.value.copy()
+    # Motors 1 and 2 always draw the same: what each adds cannot be known.
+    alike[:, :2] = alike[:, :2].mean(axis=1, keepdims=True)
+    series = replace(problem.control.series, value=alike)
+    found = fit(replace(problem, control=replace(problem.control, series=series)))
+    assert np.sqrt(np.diag(found.told_apart)).max() > 20.0
+
+
+def test_differences_are_no_better_known_than_by_plain_least_squares():
+    tell = differences_of(SIZE + 9)
+    rng = np.random.default_rng(1)
+    root = rng.normal(size=(SIZE + 9, SIZE + 9))
+    sure = Estimate(np.zeros(len(root)), root @ root.T, np.ones(2), 0.0, np.zeros((4, 2)))
+    plain = replace(sure, covariance=9.0 * sure.covariance)
+    stretch = no_surer_than(plain, sure)
+    wide = stretch @ sure.covariance @ stretch.T
+    np.testing.assert_allclose(tell @ wide @ tell.T, tell @ plain.covariance @ tell.T)
+    common = np.eye(len(root)) - tell.T @ tell
+    np.testing.assert_allclose(common @ wide @ common, common @ sure.covariance @ common, atol=1e-9)
+    np.testing.assert_array_equal(no_surer_than(sure, plain), np.eye(len(root)))

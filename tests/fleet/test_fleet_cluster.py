@@ -4,13 +4,21 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
+from contextlib import AbstractContextManager
+from typing import Any
 
 import pytest
-from distributed import LocalCluster
 from fleet_toys import die_of_three, double, fail_of_three
 
 from magcomp.errors import LinkError
 from magcomp.fleet.cluster import connected, run
+
+
+def cluster(**options: object) -> AbstractContextManager[Any]:
+    """A cluster on this computer."""
+    from distributed import LocalCluster  # noqa: PLC0415 - no other test needs so much of it
+
+    return LocalCluster(**options)
 
 
 def lost(task: int, why: str) -> tuple[int, str]:
@@ -20,10 +28,10 @@ def lost(task: int, why: str) -> tuple[int, str]:
 @pytest.fixture(scope="module")
 def scheduler() -> Iterator[str]:
     """One worker in this process."""
-    with LocalCluster(
+    with cluster(
         processes=False, n_workers=1, threads_per_worker=1, dashboard_address=":0", protocol="tcp"
-    ) as cluster:
-        yield cluster.scheduler_address
+    ) as local:
+        yield local.scheduler_address
 
 
 def test_every_piece_is_done_once(scheduler: str) -> None:
@@ -67,8 +75,8 @@ def test_no_scheduler_is_a_link_that_fails(monkeypatch: pytest.MonkeyPatch) -> N
 @pytest.mark.slow
 def test_a_piece_that_kills_every_worker_is_lost_alone() -> None:
     with (
-        LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0") as cluster,
-        connected(cluster.scheduler_address) as client,
+        cluster(n_workers=1, threads_per_worker=1, dashboard_address=":0") as local,
+        connected(local.scheduler_address) as client,
     ):
         results = list(run(client, range(6), die_of_three, lost))
     (killed,) = [each for each in results if isinstance(each, tuple)]

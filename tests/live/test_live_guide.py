@@ -153,6 +153,19 @@ def test_a_flight_ends_when_the_answer_is_good_and_no_longer_changes():
     assert guide(replace(enough, armed=False)).text == "that is enough"
 
 
+def test_who_has_landed_waits_for_the_answer_of_the_whole_flight_and_gets_it():
+    seen = coverage(l2=headings(range(6)), l3=headings(range(SECTORS)), l4=headings(range(6)))
+    landed = view(Situation.FLYING, armed=False, coverage=seen, seconds=90.0, answered=False)
+    assert "wait for the answer" in guide(landed).text
+    assert "wait for the answer" in guide(replace(landed, grade=Grade.GOOD)).text
+    good = guide(replace(landed, grade=Grade.GOOD, bound_deg=2.0, answered=True))
+    assert good.enough
+    assert good.text == "that is enough"
+    poor = guide(replace(landed, grade=Grade.MARGINAL, answered=True))
+    assert not poor.enough
+    assert "fly once more" in poor.text
+
+
 def test_a_held_vehicle_is_turned_then_tilted_then_given_more_throttle():
     flat = view(Situation.HELD, throttle=0.0)
     assert "turn slowly to the" in guide(flat).text

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from magcomp.analysis import analyse
+from magcomp.errors import MissingDataError
 from magcomp.live.refit import Refitter
 from magcomp.live.refresh import refresh
 from magcomp.mavlink.records import records
@@ -55,5 +56,23 @@ def test_an_error_nobody_foresaw_is_told_and_the_fitting_goes_on():
         assert refitter.state.trouble == (
             "this should not have happened: IndexError: index 3 is out of bounds"
         )
+    finally:
+        refitter.close()
+
+
+def test_a_fit_that_is_waited_for_is_made_at_once_and_counted():
+    def empty():
+        raise MissingDataError("There must be a flight; instead there is none.")
+
+    # So small a share of the processor that the second attempt would be hours away.
+    refitter = Refitter(empty, None, share=1e-9)
+    try:
+        while refitter.state.full < 1:
+            refitter._thread.join(0.01)
+        assert refitter.state.hurried == 0
+        refitter.hurry()
+        while refitter.state.hurried < 1:
+            refitter._thread.join(0.01)
+        assert refitter.state.full == 2
     finally:
         refitter.close()

@@ -7,7 +7,7 @@ import time
 
 import numpy as np
 import pytest
-from live_vehicle import COMPENSATION, PATIENCE_S, alive, free_port, held, landed
+from live_vehicle import COMPENSATION, PATIENCE_S, RATES, alive, free_port, held, landed
 from truth import FIXTURES
 
 from magcomp.analysis import Options, analyse, parameter_set
@@ -28,15 +28,6 @@ from magcomp.writing.events import Standing
 from magcomp.writing.journal import read_journal
 
 ONE = Options(compass=1, regressor="current")
-RATES = {
-    **dict.fromkeys(("RAW_IMU", "SCALED_IMU2", "SCALED_IMU3", "BATTERY_STATUS"), 10.0),
-    "ATTITUDE": 20.0,
-    "VFR_HUD": 5.0,
-    "SYS_STATUS": 2.0,
-    "GLOBAL_POSITION_INT": 2.0,
-}
-"""A third of the usual: enough for a fit, and less to simulate."""
-
 DEVICE_IDS = (97539, 131874, 263178)
 
 
@@ -156,7 +147,7 @@ class TestAFlight:
 
 
 def test_a_log_is_replayed_as_if_it_were_live():
-    log = FIXTURES / "flight.tlog"
+    log = FIXTURES / "flight_low_rate.tlog"
     with LiveSession.open(f"{log},500x", refit_share=0.0) as session:
         shown = until(lambda shown: shown.ended, session)
         assert shown.situation is Situation.FLYING

@@ -402,26 +402,28 @@ REDEFINED = [
     Form(BAT.number, "BAT", BAT.kinds, f"TimeUS,Inst,Volt,C{k}") for k in range(SIZE // 112)
 ]
 COSTLY = {
-    "headers alone": FMT.definition() + HEAD * (SIZE // 2),
-    "records of three bytes": EMPTY.definition() + (HEAD + bytes([200])) * (SIZE // 3),
-    "three bytes and one more": EMPTY.definition() + (HEAD + bytes([200, 0])) * (SIZE // 4),
-    "a message redefined each time": b"".join(
+    "headers alone": lambda: FMT.definition() + HEAD * (SIZE // 2),
+    "records of three bytes": lambda: EMPTY.definition() + (HEAD + bytes([200])) * (SIZE // 3),
+    "three bytes and one more": lambda: EMPTY.definition() + (HEAD + bytes([200, 0])) * (SIZE // 4),
+    "a message redefined each time": lambda: b"".join(
         form.definition() + form.record((k, 0, 1.0, 2.0)) for k, form in enumerate(REDEFINED)
     ),
-    "a parameter that changes each time": b"".join(
+    "a parameter that changes each time": lambda: b"".join(
         PARM.record((100_000 * k, "COMPASS_OFS_X", float(k))) for k in range(SIZE // 31)
     ),
-    "every instance": b"".join(
+    "every instance": lambda: b"".join(
         BAT.record((1000 * k, k % 256, 1.0, 2.0)) for k in range(SIZE // 20)
     ),
-    "a clock that goes back each time": b"".join(
+    "a clock that goes back each time": lambda: b"".join(
         BAT.record((10**12 - 10**7 * k, 0, 1.0, 2.0)) for k in range(SIZE // 20)
     ),
-    "empty lines": b"\n" * SIZE,
-    "lines without columns": b"MAG,\n" * (SIZE // 5),
-    "one line": b"MAG," + b"1," * (SIZE // 2),
-    "columns that are no numbers": b"MAG, 1, 0, x, 3, 4, 5, 6, 7, 8, 9, 1, 1, 4\n" * (SIZE // 44),
-    "formats of everything": b"".join(
+    "empty lines": lambda: b"\n" * SIZE,
+    "lines without columns": lambda: b"MAG,\n" * (SIZE // 5),
+    "one line": lambda: b"MAG," + b"1," * (SIZE // 2),
+    "columns that are no numbers": lambda: (
+        b"MAG, 1, 0, x, 3, 4, 5, 6, 7, 8, 9, 1, 1, 4\n" * (SIZE // 44)
+    ),
+    "formats of everything": lambda: b"".join(
         b"FMT, %d, 9, Z%d, Qf, A,B\n" % (k % 256, k % 999) for k in range(SIZE // 30)
     ),
 }
@@ -430,9 +432,10 @@ COSTLY = {
 @pytest.mark.parametrize("what", COSTLY)
 def test_memory_stays_within_a_multiple_of_the_log(tmp_path: Path, what: str) -> None:
     log = short_flight(2.0)
-    is_text = COSTLY[what].endswith((b"\n", b"1,"))
+    costly = COSTLY[what]()
+    is_text = costly.endswith((b"\n", b"1,"))
     path = tmp_path / "log"
-    path.write_bytes((log.text() if is_text else log.binary()) + COSTLY[what])
+    path.write_bytes((log.text() if is_text else log.binary()) + costly)
     tracemalloc.start()
     try:
         read_or_refused(path)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import re
 import threading
 import time
@@ -171,13 +172,17 @@ def app(
     )
 
 
-async def until(pilot: Any, true: Callable[[], object], *, idle: bool = True) -> None:
+async def until(
+    pilot: Any, true: Callable[[], object], *, idle: bool = True, look_s: float = 0.01
+) -> None:
     """Let the app work until a condition holds, and then until there is nothing more to do."""
     deadline = time.monotonic() + PATIENCE_S
     while not true():
         if time.monotonic() > deadline:
             raise TimeoutError(f"the condition never held; the screen says:\n{picture(pilot.app)}")
-        await pilot.pause(0.01)
+        if pilot.app._exception is not None:
+            raise pilot.app._exception
+        await asyncio.sleep(look_s)
     if idle:
         await pilot.pause()
 

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import live_vehicle
 import numpy as np
+import pytest
 import scripted
 from scripted import screen
 
+from magcomp.live.session import LiveSession
 from magcomp.sources import read
-from magcomp.tui import opening
+from magcomp.tui import opening, watcher
 from magcomp.tui.screens.dialogs import Confirm
 from magcomp.tui.services import Services
 
 
 async def until(pilot, true) -> None:
     """Pilot's own way waits for an idle process, and the simulated vehicle never is."""
-    await scripted.until(pilot, true, idle=False)
+    await scripted.until(pilot, true, idle=False, look_s=0.05)
 
 
 async def tap(pilot, key: str) -> None:
@@ -25,9 +29,17 @@ async def tap(pilot, key: str) -> None:
     await until(pilot, lambda: pilot.app.busy is None)
 
 
+@pytest.fixture(autouse=True)
+def _little_to_do(monkeypatch):
+    """A busy computer has to simulate, receive, fit and draw at once: less of each will do."""
+    slower = partial(LiveSession.open, rates=live_vehicle.RATES)
+    monkeypatch.setattr(LiveSession, "open", slower)
+    monkeypatch.setattr(watcher, "EVERY_S", 0.5)
+
+
 async def test_the_whole_road(tmp_path):
     usual = Services()
-    with live_vehicle.alive("sweep", seed=4, speed=16.0) as flown:
+    with live_vehicle.alive("sweep", seed=4, speed=20.0) as flown:
         before = dict(flown.vehicle.parameters)
         app = scripted.app(tmp_path, flown.address, open_live=usual.open_live)
         async with app.run_test(size=(120, 40)) as pilot:

@@ -6,6 +6,7 @@ import made
 import pytest
 import scripted
 from scripted import PATIENCE_S, ScriptedSession, press, screen, until
+from textual.widgets import Input
 
 from magcomp.errors import VehicleRefusedError
 from magcomp.live.situation import Situation
@@ -34,6 +35,13 @@ async def asked(pilot) -> None:
     await until(pilot, lambda: isinstance(pilot.app.screen, AskText))
 
 
+async def named(pilot) -> None:
+    """The name is given as it was asked for."""
+    await asked(pilot)
+    pilot.app.screen.query(Input).first().value = NAME
+    await pilot.press("enter")
+
+
 class Spinning:
     """A sweep that goes on until it is stopped."""
 
@@ -57,9 +65,7 @@ async def test_any_key_stops(tmp_path, monkeypatch, key):
     monkeypatch.setattr(sweeping, "DEAF_S", PATIENCE_S)
     sweep = Spinning()
     async with on_the_ground(tmp_path, sweep).run_test() as pilot:
-        await asked(pilot)
-        await press(pilot, *NAME)
-        await pilot.press("enter")
+        await named(pilot)
         await until(pilot, lambda: "all 4 motors at 50%" in screen(pilot.app))
         shown = screen(pilot.app)
         assert "motor 1 at 30%: 1.2 A" in shown
@@ -73,9 +79,8 @@ async def test_any_key_stops(tmp_path, monkeypatch, key):
 async def test_a_screen_that_takes_no_key_any_more_stops_too(tmp_path, monkeypatch):
     sweep = Spinning()
     async with on_the_ground(tmp_path, sweep).run_test() as pilot:
-        await asked(pilot)
         monkeypatch.setattr(Sweeping, "silent_s", sweeping.DEAF_S + 1.0)
-        await press(pilot, *NAME, "enter")
+        await named(pilot)
         await until(pilot, lambda: isinstance(pilot.app.screen, Message))
         assert "the screen takes no key any more" in screen(pilot.app)
 
@@ -114,8 +119,7 @@ async def test_what_stopped_it_is_said(tmp_path, reason):
         return Outcome((), reason, "the vehicle tilted by 8°")
 
     async with on_the_ground(tmp_path, sweep).run_test() as pilot:
-        await asked(pilot)
-        await press(pilot, *NAME, "enter")
+        await named(pilot)
         await until(pilot, lambda: isinstance(pilot.app.screen, Message))
         assert "The sweep was stopped because the vehicle tilted by 8°" in screen(pilot.app)
         assert not any(isinstance(each, Sweeping) for each in pilot.app.screen_stack)

@@ -82,7 +82,7 @@ def card_text(card: VehicleCard | None) -> Content:
     for warning in card.warnings:
         lines.append(Content.assemble(("Mind: ", "bold $warning"), warning))
     if not card.warnings:
-        lines.append(Content.assemble(("● ", "$success"), "Nothing stands in the way."))
+        lines.append(Content.assemble(("● ", "$success"), "Nothing stands in the way of a fit."))
     return Content("\n").join(lines)
 
 

@@ -15,6 +15,8 @@ from magcomp.analysis import Options
 from magcomp.fit import METHODS
 from magcomp.model import Analysis, Grade, quantity_of
 from magcomp.report import words
+from magcomp.report.as_json import analysis_object
+from magcomp.report.plain import pilots_lines
 from magcomp.tui.fits import fit_rows, time_range
 from magcomp.tui.messages import OptionsChosen, TimeRangeWanted
 from magcomp.tui.pictures import AXIS_WORDS, CompassPicture
@@ -71,6 +73,7 @@ and C change method, regressor, time range and compasses, and fit again at once;
         self._compass = 0
         self._view = "heading"
         self._drawn: tuple[CompassPicture, Analysis] | None = None
+        self._line: tuple[Analysis | None, str] = (None, "")
 
     def body(self) -> Iterable[Widget]:
         """Grades, options, progress, and the four views."""
@@ -125,7 +128,7 @@ and C change method, regressor, time range and compasses, and fit again at once;
         shown = pictures[self._compass]
         early = self.state.early
         self.query_one("#grades", Static).update(grades_line(analysis, self._compass, early=early))
-        self.query_one(ReasonLine).show(shown.result, early=early)
+        self.query_one(ReasonLine).show(shown.result, self._pilots_line(analysis), early=early)
         if self._drawn == (shown, analysis):
             return
         if self._drawn is None:
@@ -147,6 +150,12 @@ and C change method, regressor, time range and compasses, and fit again at once;
         each = "  ".join(f"{axis} {words.number(float(value))}" for axis, value in axes)
         per = quantity_of(shown.result.fit.regressor).per
         self.query_one("#view-shift").border_subtitle = f"{each}  {per}"
+
+    def _pilots_line(self, analysis: Analysis) -> str:
+        """What to do, in words without statistics."""
+        if self._line[0] is not analysis:
+            self._line = analysis, pilots_lines(analysis_object(analysis))[0]
+        return self._line[1]
 
     def _key(self, name: str) -> str:
         """The key of an action as it is displayed; the settings may have changed it."""
@@ -225,10 +234,10 @@ def options_line(options: Options, analysis: Analysis | None, keys: Sequence[str
         ("time", time_range(options)),
     )
     texts = [
-        Content.assemble((f" {key}", "bold $accent"), (f" {name} ", "$quiet"), value)
+        Content.assemble((key, "bold $accent"), (f" {name} ", "$quiet"), value)
         for key, (name, value) in zip(keys, parts, strict=True)
     ]
-    return Content(" ").join(texts)
+    return Content("  ").join(texts)
 
 
 def grades_line(analysis: Analysis, shown: int, *, early: bool = False) -> Content:

@@ -108,7 +108,7 @@ press M to say it, once or more, until the *next* line names it.
     def _show_mind(self, live: LiveSnapshot) -> None:
         room = _MANY if self.has_class("-tall") else _FEW
         mind = Content("\n").join(
-            Content.assemble((" Mind: ", "bold $warning"), words.sentence(text))
+            Content.assemble(("Mind: ", "bold $warning"), words.sentence(text))
             for text in live.warnings[:room]
         )
         if mind.plain != self._mind:

@@ -119,13 +119,13 @@ class ReviewScreen(StepScreen):
 
     def _place(self) -> Content:
         writing = self.state.writing
-        lines = [Content.assemble((" Mind: ", "bold $warning"), text) for text in writing.warnings]
+        lines = [Content.assemble(("Mind: ", "bold $warning"), text) for text in writing.warnings]
         if writing.backup is not None:
-            lines.append(Content.assemble((" Backup: ", "$quiet"), str(writing.backup)))
+            lines.append(Content.assemble(("Backup: ", "$quiet"), str(writing.backup)))
         if writing.result:
-            lines.append(Content.assemble((" Result: ", "bold"), words.sentence(writing.result)))
+            lines.append(Content.assemble(("Result: ", "bold"), words.sentence(writing.result)))
         if writing.acts:
-            lines.append(Content.assemble((" Seen: ", "bold"), words.sentence(writing.acts)))
+            lines.append(Content.assemble(("Seen: ", "bold"), words.sentence(writing.acts)))
         return Content("\n").join(lines)
 
     def _next(self) -> str:

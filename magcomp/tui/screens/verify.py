@@ -80,7 +80,7 @@ class VerifyScreen(StepScreen):
         self.say(state.busy.sentence if state.busy is not None else self._next())
 
     def _show_state(self) -> None:
-        said = "\n".join(f" {line}" for line in state_lines(self.state))
+        said = "\n".join(state_lines(self.state))
         if said != self._said:
             self._said = said
             self.query_one("#held-now", Static).update(Content(said))
@@ -92,7 +92,7 @@ class VerifyScreen(StepScreen):
         if live is not None and live.armed and live.situation is Situation.FLYING:
             return "Hold a heading, climb and descend: “takes out” grows with the throttle."
         if writing.measured:
-            return "Done: Q ends and says where your files are. Or fly again to measure again."
+            return "Done: Q ends and says where your files are. Fly on to measure again."
         if writing.in_force and not self._watch.marked:
             return "Fly as before and land: it is then measured. On the ground: M, see F1."
         if not self._watch.marked:

@@ -19,7 +19,7 @@ class HeadingTable(Drawn[tuple[ErrorRow, ...]]):
     HELP = """\
 **Heading error** – how wrong the heading can be over a full turn, at each current or throttle.
 
-- *now*: with the calibration the vehicle has.
+- *now*: with the calibration the vehicle has; ≤ where it is no better known than that.
 - *corrected*: with this fit, as expected.
 - *at most*: with this fit, not exceeded with 95 % probability.
 
@@ -43,8 +43,8 @@ Rows with `*` were not reached in the recording: they are extrapolated.
             lines.append(
                 Content.assemble(
                     f"{row.label:>7}{' ' if row.covered else '*'} ",
-                    f"{row.before:7.1f}° ",
-                    tail(row.before / largest, length, style="$error"),
+                    f"{row.now:>8}° ",
+                    tail(max(row.before, row.floor) / largest, length, style="$error"),
                     f"{row.after:9.1f}°",
                     f"{row.bound:8.1f}° ",
                     tail(row.bound / largest, length, style="$success"),

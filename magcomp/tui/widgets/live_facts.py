@@ -88,10 +88,8 @@ def bound_words(live: LiveSnapshot) -> str:
         return "" if live.grade is None else "too early for a bound"
     bound = live.bound
     at = words.quantity(bound.u, bound.regressor)
-    return (
-        f"at hover at most {bound.degrees[-1]:.1f}° (95 %), {trend(bound)} "
-        f"{sparkline(bound.degrees)} at {at}{_more(live, bound)}"
-    )
+    course = f", {trend(bound)} {sparkline(bound.degrees)}" if len(bound.degrees) > 1 else ""
+    return f"at hover at most {bound.degrees[-1]:.1f}° (95 %){course} at {at}{_more(live, bound)}"
 
 
 def _more(live: LiveSnapshot, bound: Bound) -> str:

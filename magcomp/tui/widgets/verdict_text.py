@@ -35,10 +35,22 @@ class ReasonLine(Drawn[tuple[str, Grade, str]]):
 
     SETS_HEIGHT = True
 
-    def show(self, result: CompassResult, *, early: bool) -> None:
-        """Draw the first reason of one compass; ``early`` as for :func:`grade_so_far`."""
+    def show(self, result: CompassResult, line: str, *, early: bool) -> None:
+        """Draw the pilot's line, or why one compass is not good.
+
+        Parameters
+        ----------
+        result
+            Of the compass.
+        line
+            What to do with the whole fit; see :func:`magcomp.report.plain.pilots_lines`.
+        early
+            As for :func:`grade_so_far`.
+        """
         reasons, grade = result.verdict.reasons, result.verdict.grade
         text = words.sentence(reasons[0]) if reasons else ""
+        if grade is Grade.GOOD:
+            text = line
         title = "" if grade is Grade.GOOD else f"Compass {result.fit.compass} is {grade.value}: "
         if early and grade is Grade.REJECTED:
             title = f"Too early for compass {result.fit.compass}: "
