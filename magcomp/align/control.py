@@ -45,6 +45,7 @@ PX4's telemetry does by 0.5 up to 1.15: docs/autopilots.md, PX4: link.
 """
 _STEPS_SEEN = 1.5
 _CLEARLY_SMOOTHED = 0.9
+_MOST_REGRESSED = 20_000
 _MOST_ROWS = 1_000_000
 """More rows in even steps than this mean that the times are not to be trusted."""
 
@@ -247,7 +248,10 @@ def _rebuilt_through(
 ) -> Rebuilt | None:
     """The quantity of which the reference is the smoothed one."""
     seen = smoothed(features, smoothing)
-    fits = [_regress(reference, seen, shift) for shift in _SHIFTS]
+    # Enough to find four coefficients by: of hours of current every few readings.
+    few = slice(None, None, -(-len(reference) // _MOST_REGRESSED))
+    told = Series(reference.time[few], reference.value[few])
+    fits = [_regress(told, seen, shift) for shift in _SHIFTS]
     best = min(range(len(fits)), key=lambda k: fits[k][1])
     coefficients, cost = fits[best]
     if not cost < (1 - _LEAST_EXPLAINED) * float(np.var(reference.value)):
