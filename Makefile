@@ -19,7 +19,7 @@ test: $(VENV)/installed-dev
 	@$(MAKE) --no-print-directory -j 2 lint tests-only
 
 # Three workers for two cores: some tests wait.
-tests-only: $(VENV)/compiled
+tests-only: $(VENV)/collected
 	@$(BIN)/python -m pytest -n 3 --dist worksteal -q -m "not slow"
 
 test-all: $(VENV)/installed-dev lint
@@ -86,9 +86,8 @@ $(VENV)/installed-dev: pyproject.toml | $(VENV)/bin/python
 	@touch $(VENV)/installed $@
 
 # What every worker would compile for itself at the same time.
-$(VENV)/compiled: | $(VENV)/installed-dev
-	@$(BIN)/python -m pytest --collect-only -q > $@.log || true
-	@mkdir -p $@
+$(VENV)/collected: $(VENV)/installed-dev
+	@$(BIN)/python -m pytest --collect-only -q > $@ || true
 
 clean:
 	rm -rf $(VENV) build dist .mypy_cache .ruff_cache .pytest_cache .import_linter_cache

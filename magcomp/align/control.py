@@ -28,6 +28,7 @@ from magcomp.model import (
     Series,
     interpolate,
     median,
+    running_mean,
 )
 
 _SHIFTS = np.arange(-0.2, 0.301, 0.02)
@@ -44,6 +45,7 @@ PX4's telemetry does by 0.5 up to 1.15: docs/autopilots.md, PX4: link.
 """
 _STEPS_SEEN = 1.5
 _CLEARLY_SMOOTHED = 0.9
+_MOST_REGRESSED = 20_000
 _MOST_ROWS = 1_000_000
 """More rows in even steps than this mean that the times are not to be trusted."""
 
@@ -246,7 +248,10 @@ def _rebuilt_through(
 ) -> Rebuilt | None:
     """The quantity of which the reference is the smoothed one."""
     seen = smoothed(features, smoothing)
-    fits = [_regress(reference, seen, shift) for shift in _SHIFTS]
+    # Enough to find four coefficients by: of hours of current every few readings.
+    few = slice(None, None, -(-len(reference) // _MOST_REGRESSED))
+    told = Series(reference.time[few], reference.value[few])
+    fits = [_regress(told, seen, shift) for shift in _SHIFTS]
     best = min(range(len(fits)), key=lambda k: fits[k][1])
     coefficients, cost = fits[best]
     if not cost < (1 - _LEAST_EXPLAINED) * float(np.var(reference.value)):
@@ -254,7 +259,7 @@ def _rebuilt_through(
     time = features.time + _SHIFTS[best]
     as_reported = Series(time, coefficients[0] + seen.value @ coefficients[1:])
     left = reference.value - interpolate(as_reported, reference.time)
-    trend = _running_mean(Series(reference.time, left), _TREND_S)
+    trend = running_mean(Series(reference.time, left), _TREND_S)
     modelled = coefficients[0] + features.value @ coefficients[1:]
     slow = interpolate(trend, time)
     value = np.maximum(modelled + slow, 0.0)
@@ -288,11 +293,3 @@ def _regress(reference: Series, features: Series, shift: float) -> tuple[FloatAr
         spread = 1.4826 * float(median(np.abs(left))) + 1e-3 * float(np.ptp(reference.value))
         weight = 1 / (1 + (left / (3 * spread)) ** 2)
     return np.asarray(coefficients), float(np.average(left**2, weights=weight))
-
-
-def _running_mean(series: Series, half_width: float) -> Series:
-    """Mean over a window in time, for what drifts slowly: battery sag, temperature."""
-    total = np.concatenate([[0.0], np.cumsum(series.value)])
-    first = np.searchsorted(series.time, series.time - half_width, side="left")
-    last = np.searchsorted(series.time, series.time + half_width, side="right")
-    return Series(series.time, (total[last] - total[first]) / (last - first))

@@ -60,8 +60,11 @@ def currents_of_motors(recording: Recording) -> tuple[Control, ...]:
     time = _often(found.control.series.time)
     told_at = Series(found.control.series.time, told)
     turns = each.sum(axis=1) > _LEAST_A
-    shares = [_between(told_at, turns, time, lasting=lasting) for lasting in (True, False)]
-    unsure = _apart(interpolate(told_at, time), shares[-1])
+    shares = {
+        how: _between(told_at, turns, time, lasting=lasting)
+        for how, lasting in (("", True), (" as far as they last", False))
+    }
+    unsure = _apart(interpolate(told_at, time), [*shares.values()][-1])
     totals = {
         "as the outputs tell it": interpolate(found.control.series, time),
         "as reported": interpolate(recording.current, time),
@@ -70,12 +73,12 @@ def currents_of_motors(recording: Recording) -> tuple[Control, ...]:
         Control(
             MOTORS,
             smoothed(Series(time, share * total[:, None]), constant),
-            f"battery current {how}, shared out by the motor outputs, which each motor follows "
-            f"within {1000 * constant:.0f} ms",
+            f"battery current {how}, shared out by the motor outputs{lasting}, which each motor "
+            f"follows within {1000 * constant:.0f} ms",
             duty.numbers,
             unsure,
         )
-        for share in shares
+        for lasting, share in shares.items()
         for how, total in totals.items()
         for constant in SMOOTHINGS_S
     )

@@ -12,6 +12,7 @@ from magcomp.align import (
     controls,
     currents_of_motors,
     expected_earth,
+    on_lift_alone,
     readings,
     reported,
     thinned,
@@ -19,6 +20,7 @@ from magcomp.align import (
 )
 from magcomp.align.health import compass_complaints, current_complaints, vehicle_complaints
 from magcomp.align.orientation import orientation_complaint
+from magcomp.analysis.by_evidence import motors_where_better
 from magcomp.analysis.choose import with_speed_controllers
 from magcomp.analysis.compare import Judged, beaten, better
 from magcomp.analysis.emit import Emission, emit
@@ -126,6 +128,7 @@ def analyse(
     if wanted.regressor == ESC:
         recording = with_speed_controllers(recording)
         wanted = replace(wanted, regressor=CURRENT)
+    recording, left_out = on_lift_alone(recording)
     compasses = _compasses(recording, wanted)
     found = _controls_of(recording)
     motors = currents_of_motors(recording)
@@ -160,9 +163,16 @@ def analyse(
     progress("done", 1.0)
     chosen = MOTORS if MOTORS in judged else better(judged)
     answers = [as_written(recording, each) for each in judged[chosen]]
+    forms_of = compared(judged, motors, reported(found).get(THROTTLE))
+    if wanted.regressor == "auto" and chosen == CURRENT:
+        answers = motors_where_better(
+            recording,
+            answers,
+            forms_of,
+            lambda compass: _one(recording, compass, wanted, motors, in_force, earth),
+        )
     emitted = emit(recording, [each.written for each in answers])
     nothing = all(each.judged.is_rejected for each in answers)
-    forms_of = compared(judged, motors, reported(found).get(THROTTLE))
     held_out = {k: tuple(j.held_out for j in results) for k, results in judged.items()} | plain
     why_not = why_only_to_look_at(recording, chosen)
     return Analysis(
@@ -179,8 +189,17 @@ def analyse(
             for each in answers
         ),
         notes=(
+            *([left_out] if left_out else []),
             *notes_of(recording, wanted.compass, held_out, chosen),
-            *forms_notes(forms_of, judged, chosen),
+            *forms_notes(
+                {
+                    each.judged.fit.compass: forms_of[each.judged.fit.compass]
+                    for each in answers
+                    if each.judged.fit.compass in forms_of and not each.parameters
+                },
+                judged,
+                chosen,
+            ),
             *lacking_notes(lacking, judged),
             *hints([each.judged.fit for each in answers]),
         ),
@@ -217,6 +236,7 @@ def check(recording: Recording, options: Options | None = None) -> Mapping[int, 
         As :func:`analyse`.
     """
     wanted = Options() if options is None else options
+    recording, _ = on_lift_alone(recording)
     compasses = _compasses(recording, wanted)
     found = _controls_of(recording)
     earth = expected_earth(recording)

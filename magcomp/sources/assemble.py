@@ -26,7 +26,7 @@ from magcomp.sources.clock import (
 )
 from magcomp.sources.quantities import Messages, Timed
 from magcomp.sources.repeats import repeated
-from magcomp.sources.source import is_text
+from magcomp.sources.source import is_text, let_go
 from magcomp.sources.vehicles import ONLY_ONE, Choice, choose, require_one_clock
 
 Buffer = bytes | bytearray | memoryview | ByteArray
@@ -136,9 +136,10 @@ def decode_vehicle(
     heartbeats = found.frames[found.frames.message == Message.HEARTBEAT]
     who = choose(source, heartbeats, decode(octets, heartbeats, Message.HEARTBEAT), choice)
     mine = (found.frames.system == who.system) & (found.frames.component == who.component)
-    frames = found.frames[mine]
+    frames = found.frames if mine.all() else found.frames[mine]
     rows = _rows(frames)
     tables = {message: decode(octets, frames[rows[message]], message) for message in rows}
+    let_go(octets)
     stamp = _stamps(len(frames), rows, tables)
     copies = repeated(frames, stamp)
     if copies.any():

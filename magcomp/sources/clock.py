@@ -117,7 +117,7 @@ def time_axis(
     axis[bare] = _between(axis[anchors], anchors, bare, around, stream)
     for own in settled:
         axis[own.rows] = own.time
-    return axis.astype(np.float64) / SECOND
+    return np.divide(axis, SECOND)
 
 
 def _merged(group: Sequence[Stamps], n: int) -> Stamps:

@@ -52,7 +52,7 @@ def _sharing(mixture: OffsetArray) -> NDArray[np.intp]:
     n = len(mixture)
     # Rows in one drawer may be equal; those alone in theirs are not, and are most.
     bits = (_DRAWERS * n).bit_length()
-    drawer = mixture.view(np.uint64) >> np.uint64(64 - bits)
+    drawer = (mixture.view(np.uint64) >> np.uint64(64 - bits)).astype(np.int32)
     last = np.zeros(1 << bits, dtype=np.int32)
     number = np.arange(n, dtype=np.int32)
     last[drawer] = number

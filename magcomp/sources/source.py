@@ -40,6 +40,19 @@ def mapped(path: str | Path) -> Iterator[ByteArray]:
     yield np.frombuffer(content, dtype=np.uint8)
 
 
+def let_go(octets: ByteArray) -> None:
+    """Give a file's bytes back to the operating system, which brings again what is still asked for.
+
+    Bytes that are not those of a :func:`mapped` file stay where they are.
+    """
+    holder: object = octets
+    while isinstance(holder, np.ndarray | memoryview):
+        holder = holder.base if isinstance(holder, np.ndarray) else holder.obj
+    # Windows takes them back by itself.
+    if isinstance(holder, mmap.mmap) and hasattr(holder, "madvise"):
+        holder.madvise(mmap.MADV_DONTNEED)
+
+
 def _map(path: Path) -> mmap.mmap | bytes:
     try:
         status = path.stat()

@@ -10,9 +10,11 @@ import pytest
 from unequal import VECTORS, Unequal
 
 from magcomp.analysis.analyse import Options, analyse, check
+from magcomp.analysis.by_evidence import is_better
+from magcomp.analysis.compare import Judged
 from magcomp.autopilots import ardupilot
 from magcomp.errors import MissingDataError
-from magcomp.model import MOTORS, Grade
+from magcomp.model import MOTORS, Grade, HeadingError, ParameterHistory
 from magcomp.report.as_json import analysis_object
 
 BY_MOTOR = Options(regressor=MOTORS)
@@ -118,3 +120,44 @@ def test_json_tells_the_motors_the_forms_and_what_is_written():
     assert compass["as_written"]["regressor"] == "motors"
     assert compass["regressor"] == "motors"
     assert compass["unit"] == "A"
+
+
+def test_left_to_itself_it_corrects_motor_by_motor_where_the_firmware_can_and_the_data_say_so():
+    (result,) = analyse(LAW.recording()).compasses
+    assert result.fit.regressor == MOTORS
+    assert result.parameters["COMPASS_PMOT_EN"] == 1.0
+    assert any("motor by motor is the better choice" in why for why in result.verdict.reasons)
+
+
+@pytest.mark.parametrize("flown", [replace(LAW, vectors=VECTORS[[0, 0, 0, 0]]), LAW])
+def test_otherwise_one_current_stands(flown):
+    """Where the motors are alike, or the firmware has no law for each."""
+    recording = flown.recording()
+    if flown is LAW:
+        kept = (c for c in recording.parameters.changes if c.name != "COMPASS_PMOT_EN")
+        recording = replace(recording, parameters=ParameterHistory(tuple(kept)))
+    (result,) = analyse(recording).compasses
+    assert result.fit.regressor == "current"
+    assert not any(name.startswith("COMPASS_PMOT") for name in result.insisted if "EN" not in name)
+
+
+def table(*bounds):
+    return tuple(HeadingError(10.0 * row, 9.0, p95, p95) for row, p95 in enumerate(bounds))
+
+
+@pytest.mark.parametrize(
+    ("by_motor", "grade", "better"),
+    [
+        ((0.5, 0.5, 0.5), Grade.GOOD, True),
+        ((2.5, 0.5, 0.5), Grade.GOOD, False),
+        ((0.5, 0.5, 9.0), Grade.GOOD, True),
+        ((0.5, 0.5, 0.5), Grade.REJECTED, False),
+    ],
+)
+def test_every_row_that_was_flown_and_the_verdict_have_a_say(by_motor, grade, better):
+    """One current leaves 1° by its table, and 2° that the motors differ by: 2.2° in all."""
+    fit = replace(plain().compasses[0].fit, u_high=15.0)
+    verdict = plain().compasses[0].verdict
+    now = Judged(None, fit, replace(verdict, grade=Grade.MARGINAL, heading_error=table(1, 1, 1)))
+    new = Judged(None, fit, replace(verdict, grade=grade, heading_error=table(*by_motor)))
+    assert is_better(new, now, 2.0) is better

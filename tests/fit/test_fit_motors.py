@@ -47,7 +47,9 @@ def left_in_flight(flown, problem, found):
 
 def test_the_currents_of_the_motors_add_up_to_the_battery_and_follow_each_motor():
     flown = Unequal(seed=1)
-    control = currents_of_motors(flown.recording())[2]
+    found = currents_of_motors(flown.recording())
+    control = found[2]
+    assert len({each.origin for each in found}) == len(found)
     middle = control.series.time[50:-50]
     true = flown.drawn_at(middle)
     found = control.series.value[50:-50]
