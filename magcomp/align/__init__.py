@@ -2,7 +2,12 @@
 
 from magcomp.align.control import controls, reported
 from magcomp.align.expected import expected_earth, has_position
-from magcomp.align.motors import currents_of_motors, drive_of_motors, to_undo
+from magcomp.align.motors import (
+    currents_of_motors,
+    drawn_and_driven,
+    drive_of_motors,
+    to_undo,
+)
 from magcomp.align.phases import on_lift_alone
 from magcomp.align.readings import readings, thinned, within
 from magcomp.align.sample import sample
@@ -11,6 +16,7 @@ from magcomp.model import interpolate
 __all__ = [
     "controls",
     "currents_of_motors",
+    "drawn_and_driven",
     "drive_of_motors",
     "expected_earth",
     "has_position",
