@@ -92,7 +92,7 @@ def as_written(recording: Recording, judged: Judged) -> Answer:
     by_law = AsWritten(MOTORS, exponent, left_deg(left, whole, samples))
     if by_law.left_deg > told.left_deg:
         # Volts that fall while currents rise, or currents steeper than the law can be.
-        return _answer(recording, judged, single, {}, told)
+        return _answer(recording, judged, single, {}, told, than_law=by_law)
     parameters = autopilot.per_motor_parameters(
         moved(fit.correction, found),
         exponent,
@@ -109,12 +109,16 @@ def _answer(
     written: MotorFit,
     parameters: Mapping[str, float],
     told: AsWritten,
+    than_law: AsWritten | None = None,
 ) -> Answer:
     """With a word on what the firmware's form leaves, and no better a grade than that allows."""
     title, limits = autopilots.of(recording).title, Thresholds()
     how = (
         f"{title} corrects it motor by motor, with an exponent of {told.exponent:.2f}"
         if parameters
+        else f"{title}'s law for each motor leaves {than_law.left_deg:.1f}°, and one "
+        f"{told.regressor} follows them better"
+        if than_law is not None
         else f"{title} multiplies one {told.regressor} for all motors of this compass"
     )
     grade = (

@@ -169,4 +169,5 @@ def test_a_law_that_follows_worse_than_one_current_is_not_written():
     steep = replace(LAW, vectors=hardly, exponent=6.0)
     (result,) = analyse(steep.recording(), BY_MOTOR).compasses
     assert result.as_written.regressor == "current"
+    assert any("one current follows them better" in why for why in result.verdict.reasons)
     assert not any(name.startswith("COMPASS_PMOT") for name in result.insisted if "EN" not in name)
