@@ -66,9 +66,10 @@ release: $(VENV)/installed
 	@ls dist
 
 # Every picture of README.md and docs/ that shows what the program prints or draws; a vehicle flies.
-pictures: $(VENV)/installed
+pictures: $(VENV)/installed-dev
 	@$(BIN)/python docs/session.py
 	@$(BIN)/python docs/pictures.py
+	@$(BIN)/python docs/road.py
 
 $(VENV)/bin/python:
 	@$(PYTHON) -c 'import sys; sys.exit("magcomp needs Python 3.11 or newer") if sys.version_info < (3, 11) else None'

@@ -10,7 +10,9 @@ truth stays what the vehicle was drawn with, and nothing of it is seen by the fi
 Columns: compasses by verdict; *holds* the share of rows of the table up to the largest
 current flown, whose error is within the stated 95 % bound, over accepted fits; *bound/error* its
 median; *wrong* goods that leave more than 2 degrees; *worse* accepted fits that raise the largest
-error; *error* the median and the 90 % quantile of the largest error over accepted fits, degrees.
+error; *error* the median and the 90 % quantile of the largest error over accepted fits, degrees;
+*ideal* the median, over accepted fits, of the error at the top current over what an estimator that
+reaches the Cramér-Rao bound leaves there (the median of draws; ideal.py).
 """
 
 from __future__ import annotations
@@ -24,16 +26,18 @@ from pathlib import Path
 
 import numpy as np
 from coverage import exact_correction, true_error
+from ideal import Sizes, covariance, drawn
 
 from magcomp.align.low_pass import low_pass
 from magcomp.analysis import analyse
 from magcomp.autopilots import ardupilot
 from magcomp.earth import expected_field
-from magcomp.model import CURRENT, FloatArray, Grade, Recording, Series
-from magcomp.simulate import write_tlog
+from magcomp.model import CURRENT, Correction, FloatArray, Grade, Recording, Series
+from magcomp.simulate import Truth, write_tlog
 from magcomp.sources import read
 
 LIMIT_DEG = 2.0
+DRAWS = 60
 LEVEL_DEG, WANDER_DEG, WANDER_S = 0.5, 0.4, 30.0
 LEAN, LEAN_S = 0.03, 4.0
 DRIFT_MGAUSS, DRIFT_S = 3.0, 120.0
@@ -47,6 +51,7 @@ class Row:
     pairs: tuple[tuple[float, float], ...]
     largest: float
     before: float
+    beyond_ideal: float
 
 
 def gauss_markov(
@@ -88,8 +93,11 @@ def rows_of(
 ) -> Iterator[Row]:
     path = folder / "simulated.tlog"
     truth = write_tlog(path, program=program, seed=seed, calibrated=calibrated)
-    recording = with_real_errors(read(path), scale, np.random.default_rng(seed))
+    simulated = read(path)
+    recording = with_real_errors(simulated, scale, np.random.default_rng(seed))
     earth = expected_field(*truth.home, recording.start_unix_s)
+    rng = np.random.default_rng([seed, 1])
+    sizes = _sizes(truth.noise, scale)
     for result in analyse(recording).compasses:
         if result.fit.regressor != CURRENT:
             continue
@@ -99,7 +107,36 @@ def rows_of(
         in_force = replace(result, fit=replace(result.fit, correction=result.in_force))
         before = [true_error(truth, exact, in_force, earth, row.u) for row in flown]
         pairs = tuple(zip((row.p95 for row in flown), errors, strict=True))
-        yield Row(result.verdict.grade, pairs, max(errors), max(before))
+        spread = covariance(
+            simulated, _whole(exact, truth), earth.ned, sizes, calibrated=calibrated
+        )
+        guesses = [
+            replace(
+                result, fit=replace(result.fit, correction=drawn(_whole(exact, truth), spread, rng))
+            )
+            for _ in range(DRAWS)
+        ]
+        ideal = np.median([true_error(truth, exact, g, earth, flown[-1].u) for g in guesses])
+        beyond = errors[-1] / max(float(ideal), 1e-3)
+        yield Row(result.verdict.grade, pairs, max(errors), max(before), beyond)
+
+
+def _whole(exact: Correction, truth: Truth) -> Correction:
+    """The exact correction with its motor vector."""
+    return replace(exact, motor=-np.asarray(truth.interference).reshape(3, 1))
+
+
+def _sizes(noise: float, scale: float) -> Sizes:
+    """Of what :func:`with_real_errors` puts on top."""
+    return Sizes(
+        noise=noise,
+        drift=scale * DRIFT_MGAUSS,
+        drift_s=DRIFT_S,
+        level=scale * float(np.radians(LEVEL_DEG)),
+        wander=scale * float(np.radians(WANDER_DEG)),
+        wander_s=WANDER_S,
+        lean=scale * LEAN,
+    )
 
 
 def line(name: str, rows: list[Row]) -> str:
@@ -118,6 +155,7 @@ def line(name: str, rows: list[Row]) -> str:
         + "".join(f"{count:>5}" for count in grades)
         + f"{holds:>8.1%}{ratio:>7.2f}{wrong:>4}/{grades[0]:<3}{worse:>3}/{len(taken):<3}"
         + f"{np.median(largest):>6.2f}{np.quantile(largest, 0.9):>6.2f}"
+        + f"{np.median([row.beyond_ideal for row in taken]):>7.2f}"
     )
 
 
@@ -131,7 +169,7 @@ def main() -> None:
     parser.add_argument("--programs", default="flight,mission")
     arguments = parser.parse_args()
     print(
-        f"{'kind':<22}{'n':>4} good marg  rej   holds  b./e.   wrong  worse  error °"
+        f"{'kind':<22}{'n':>4} good marg  rej   holds  b./e.   wrong  worse  error °     ideal"
         f"   (scale {arguments.scale:g})"
     )
     everything: list[Row] = []

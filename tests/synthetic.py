@@ -107,6 +107,8 @@ class Flown:
         Parameters that took another value at a time.
     field_lag, current_lag
         Delays, seconds (magcomp.model.Lags).
+    blur
+        The field follows the mean of the current over so long before and after, seconds.
     applied_later
         What is in force is multiplied by the current of so much earlier, seconds.
     """
@@ -119,6 +121,7 @@ class Flown:
     field_lag: float = 0.07
     current_lag: float = 0.05
     applied_later: float = APPLIED_LATER_S
+    blur: float = 0.0
     noise: float = 1.0
     truncated: bool = False
     tilt: float = 0.15
@@ -147,7 +150,9 @@ class Flown:
         roll, pitch, yaw = self.attitude_at(time).T
         true = body_from_earth(roll, pitch, yaw) @ earth().ned
         measured = time + self.field_lag
-        return self.raw_of(true, self.current_at(measured - self.current_lag))
+        felt = measured - self.current_lag
+        around = self.blur * np.linspace(-1.0, 1.0, 9) if self.blur else np.zeros(1)
+        return self.raw_of(true, np.mean([self.current_at(felt + t) for t in around], axis=0))
 
     def raw_of(self, true: FloatArray, amperes: FloatArray) -> FloatArray:
         """Sensor field of a true body-axes field, mGauss, shape (n, 3)."""

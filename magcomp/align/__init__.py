@@ -2,7 +2,13 @@
 
 from magcomp.align.control import controls, reported
 from magcomp.align.expected import expected_earth, has_position
-from magcomp.align.motors import currents_of_motors, drive_of_motors, to_undo
+from magcomp.align.motors import (
+    currents_of_motors,
+    drawn_and_driven,
+    drive_of_motors,
+    to_undo,
+)
+from magcomp.align.phases import on_lift_alone
 from magcomp.align.readings import readings, thinned, within
 from magcomp.align.sample import sample
 from magcomp.model import interpolate
@@ -10,10 +16,12 @@ from magcomp.model import interpolate
 __all__ = [
     "controls",
     "currents_of_motors",
+    "drawn_and_driven",
     "drive_of_motors",
     "expected_earth",
     "has_position",
     "interpolate",
+    "on_lift_alone",
     "readings",
     "reported",
     "sample",

@@ -20,6 +20,7 @@ _NEIGHBOURS = 2
 _LEAST_PAIRS = 10
 _LEAST_ROWS = _LAGS + 2 * _NEIGHBOURS
 _SMALL = 1e-6
+_AT_A_TIME = 20_000
 
 
 def expected(series: Series, at: FloatArray, *, lasting: bool = True) -> FloatArray:
@@ -80,15 +81,22 @@ def _predicted(time: FloatArray, way: FloatArray, at: FloatArray, *, lasting: bo
     passing, forgets, shares = _memory(time, way, lasting=lasting)
 
     def covariance(apart: FloatArray) -> FloatArray:
-        return np.asarray(np.exp(-np.abs(apart)[..., None] / forgets) @ shares)
+        one, other = (s * np.exp(np.abs(apart) / -f) for s, f in zip(shares, forgets, strict=True))
+        return np.asarray(one + other)
 
-    first = np.clip(np.searchsorted(time, at) - _NEIGHBOURS, 0, len(time) - 2 * _NEIGHBOURS)
-    near = first[:, None] + np.arange(2 * _NEIGHBOURS)
-    told = time[near]
-    among = covariance(told[:, :, None] - told[:, None, :])
-    among += max(passing, _SMALL * float(np.mean(way**2))) * np.eye(2 * _NEIGHBOURS)
-    weights = np.linalg.solve(among, covariance(told - at[:, None])[:, :, None])[:, :, 0]
-    return np.asarray(np.einsum("ij,ij->i", weights, way[near]))
+    alone = max(passing, _SMALL * float(np.mean(way**2))) * np.eye(2 * _NEIGHBOURS)
+
+    def at_some(at: FloatArray) -> FloatArray:
+        first = np.clip(np.searchsorted(time, at) - _NEIGHBOURS, 0, len(time) - 2 * _NEIGHBOURS)
+        near = first[:, None] + np.arange(2 * _NEIGHBOURS)
+        told = time[near]
+        among = covariance(told[:, :, None] - told[:, None, :]) + alone
+        weights = np.linalg.solve(among, covariance(told - at[:, None])[:, :, None])[:, :, 0]
+        return np.asarray(np.einsum("ij,ij->i", weights, way[near]))
+
+    # A matrix a reading: of a log of hours a part at a time.
+    parts = np.split(at, range(_AT_A_TIME, len(at), _AT_A_TIME))
+    return np.concatenate([at_some(part) for part in parts])
 
 
 def _memory(

@@ -28,6 +28,7 @@ from magcomp.model import (
     Series,
     interpolate,
     median,
+    running_mean,
 )
 
 _SHIFTS = np.arange(-0.2, 0.301, 0.02)
@@ -258,7 +259,7 @@ def _rebuilt_through(
     time = features.time + _SHIFTS[best]
     as_reported = Series(time, coefficients[0] + seen.value @ coefficients[1:])
     left = reference.value - interpolate(as_reported, reference.time)
-    trend = _running_mean(Series(reference.time, left), _TREND_S)
+    trend = running_mean(Series(reference.time, left), _TREND_S)
     modelled = coefficients[0] + features.value @ coefficients[1:]
     slow = interpolate(trend, time)
     value = np.maximum(modelled + slow, 0.0)
@@ -292,11 +293,3 @@ def _regress(reference: Series, features: Series, shift: float) -> tuple[FloatAr
         spread = 1.4826 * float(median(np.abs(left))) + 1e-3 * float(np.ptp(reference.value))
         weight = 1 / (1 + (left / (3 * spread)) ** 2)
     return np.asarray(coefficients), float(np.average(left**2, weights=weight))
-
-
-def _running_mean(series: Series, half_width: float) -> Series:
-    """Mean over a window in time, for what drifts slowly: battery sag, temperature."""
-    total = np.concatenate([[0.0], np.cumsum(series.value)])
-    first = np.searchsorted(series.time, series.time - half_width, side="left")
-    last = np.searchsorted(series.time, series.time + half_width, side="right")
-    return Series(series.time, (total[last] - total[first]) / (last - first))

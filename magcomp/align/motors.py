@@ -44,29 +44,19 @@ def currents_of_motors(recording: Recording) -> tuple[Control, ...]:
     motors, so each motor's share of it is its current. Between the times the outputs are told at
     the share is what is to be expected (docs/method.md, Motor by motor).
     """
-    duty = duty_of(recording)
-    if recording.current is None or duty is None or len(duty.numbers) < _LEAST_MOTORS:
+    found = _told(recording)
+    if found is None or recording.current is None:
         return ()
-    found = rebuild(recording.current, duty.series, MOTORS, "battery current")
-    if found is None:
-        return ()
-    level, *slopes = found.coefficients
-    curved = sum(
-        slope * duty.series.value**power for slope, power in zip(slopes, POWERS, strict=True)
-    )
-    each = np.maximum((level + curved) / len(duty.numbers), 0.0)
-    # The battery sags for all motors alike: what outputs do not explain is shared in proportion.
-    told = each / np.maximum(each.sum(axis=1, keepdims=True), _LEAST_A)
-    time = _often(found.control.series.time)
-    told_at = Series(found.control.series.time, told)
-    turns = each.sum(axis=1) > _LEAST_A
+    told_at, rebuilt, numbers = found
+    time = _often(rebuilt.time)
+    turns = told_at.value.sum(axis=1) > 0.5
     shares = {
         how: _between(told_at, turns, time, lasting=lasting)
         for how, lasting in (("", True), (" as far as they last", False))
     }
     unsure = _apart(interpolate(told_at, time), [*shares.values()][-1])
     totals = {
-        "as the outputs tell it": interpolate(found.control.series, time),
+        "as the outputs tell it": interpolate(rebuilt, time),
         "as reported": interpolate(recording.current, time),
     }
     return tuple(
@@ -75,13 +65,52 @@ def currents_of_motors(recording: Recording) -> tuple[Control, ...]:
             smoothed(Series(time, share * total[:, None]), constant),
             f"battery current {how}, shared out by the motor outputs{lasting}, which each motor "
             f"follows within {1000 * constant:.0f} ms",
-            duty.numbers,
+            numbers,
             unsure,
         )
         for lasting, share in shares.items()
         for how, total in totals.items()
         for constant in SMOOTHINGS_S
     )
+
+
+def _told(recording: Recording) -> tuple[Series, Series, tuple[int, ...]] | None:
+    """Shares of the motors and their total current when the outputs were told, and which motors.
+
+    The shares of motors at rest are nothing.
+    """
+    duty = duty_of(recording)
+    if recording.current is None or duty is None or len(duty.numbers) < _LEAST_MOTORS:
+        return None
+    found = rebuild(recording.current, duty.series, MOTORS, "battery current")
+    if found is None:
+        return None
+    level, *slopes = found.coefficients
+    curved = sum(
+        slope * duty.series.value**power for slope, power in zip(slopes, POWERS, strict=True)
+    )
+    each = np.maximum((level + curved) / len(duty.numbers), 0.0)
+    # The battery sags for all motors alike: what outputs do not explain is shared in proportion.
+    share = each / np.maximum(each.sum(axis=1, keepdims=True), _LEAST_A)
+    total = found.control.series
+    return Series(total.time, share), total, duty.numbers
+
+
+def drawn_and_driven(recording: Recording) -> tuple[Control, Control] | None:
+    """What each motor draws and what drives it, at the times the outputs were told, and only then.
+
+    Returns
+    -------
+    tuple of Control
+        In A and in V, of the same rows; None where the recording lacks the voltage, or what
+        :func:`currents_of_motors` needs.
+    """
+    found, drive = _told(recording), drive_of_motors(recording)
+    if found is None or drive is None:
+        return None
+    share, total, numbers = found
+    drawn = Series(total.time, share.value * total.value[:, None])
+    return Control(MOTORS, drawn, "as the outputs tell it", numbers), drive
 
 
 def _often(time: FloatArray) -> FloatArray:

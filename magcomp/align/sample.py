@@ -59,6 +59,7 @@ def sample(
     later = lags.regressor + readings.applied_later if lags.applied is None else lags.applied
     applied = readings.time - later
     raw, raw_rate = _undo(readings, in_force, applied)
+    u = _columns(interpolate(control.series, commanded))
     return Samples(
         compass=readings.compass,
         lags=lags,
@@ -69,8 +70,9 @@ def sample(
         attitude=attitude,
         down=gravity_direction(attitude[:, 0], attitude[:, 1]),
         down_rate=(after - before) / (2 * _RATE_STEP_S),
-        u=_columns(interpolate(control.series, commanded)),
+        u=u,
         u_rate=_columns(_rate(control.series, commanded)),
+        u_blur=_columns(interpolate(control.blurred, commanded)) - u,
     )
 
 

@@ -12,6 +12,7 @@ from magcomp.align import (
     controls,
     currents_of_motors,
     expected_earth,
+    on_lift_alone,
     readings,
     reported,
     thinned,
@@ -127,6 +128,7 @@ def analyse(
     if wanted.regressor == ESC:
         recording = with_speed_controllers(recording)
         wanted = replace(wanted, regressor=CURRENT)
+    recording, left_out = on_lift_alone(recording)
     compasses = _compasses(recording, wanted)
     found = _controls_of(recording)
     motors = currents_of_motors(recording)
@@ -187,6 +189,7 @@ def analyse(
             for each in answers
         ),
         notes=(
+            *([left_out] if left_out else []),
             *notes_of(recording, wanted.compass, held_out, chosen),
             *forms_notes(
                 {
@@ -233,6 +236,7 @@ def check(recording: Recording, options: Options | None = None) -> Mapping[int, 
         As :func:`analyse`.
     """
     wanted = Options() if options is None else options
+    recording, _ = on_lift_alone(recording)
     compasses = _compasses(recording, wanted)
     found = _controls_of(recording)
     earth = expected_earth(recording)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from magcomp import autopilots
-from magcomp.align import drive_of_motors, interpolate
+from magcomp.align import drawn_and_driven
 from magcomp.analysis.compare import Judged
 from magcomp.autopilots.terms import MotorLaw
 from magcomp.fit.nearest import moved, nearest
@@ -26,7 +26,6 @@ from magcomp.model import (
     MotorFit,
     Recording,
     Samples,
-    Series,
     quantity_of,
 )
 
@@ -80,14 +79,20 @@ def as_written(recording: Recording, judged: Judged) -> Answer:
     told = AsWritten(single.regressor, np.nan, left_deg(left, whole, samples))
     autopilot, values = autopilots.of(recording), recording.parameters.latest
     law = autopilot.motor_law(fit.compass, values)
-    drive = None if law is None else _drive(recording, problem.control, samples, law)
-    if law is None or drive is None:
+    rows = None if law is None else _rows(recording, problem.control, samples, law)
+    if law is None or rows is None:
         return _answer(recording, judged, single, {}, told)
+    drawn, drive = rows
+    added = fit.correction.added(drawn)
     exponents = np.linspace(_LEAST_EXPONENT, law.most_exponent, _STEPS)
     exponent = min(
         exponents.tolist(), key=lambda e: float(np.sum(nearest(added, drive**e)[1] ** 2))
     )
     found, left = nearest(added, drive**exponent)
+    by_law = AsWritten(MOTORS, exponent, left_deg(left, whole, samples))
+    if by_law.left_deg > told.left_deg:
+        # Volts that fall while currents rise, or currents steeper than the law can be.
+        return _answer(recording, judged, single, {}, told, than_law=by_law)
     parameters = autopilot.per_motor_parameters(
         moved(fit.correction, found),
         exponent,
@@ -95,8 +100,7 @@ def as_written(recording: Recording, judged: Judged) -> Answer:
         values,
         soft_iron_fitted="diagonal" in fit.free,
     )
-    told = AsWritten(MOTORS, exponent, left_deg(left, whole, samples))
-    return _answer(recording, judged, single, parameters, told)
+    return _answer(recording, judged, single, parameters, by_law)
 
 
 def _answer(
@@ -105,12 +109,16 @@ def _answer(
     written: MotorFit,
     parameters: Mapping[str, float],
     told: AsWritten,
+    than_law: AsWritten | None = None,
 ) -> Answer:
     """With a word on what the firmware's form leaves, and no better a grade than that allows."""
     title, limits = autopilots.of(recording).title, Thresholds()
     how = (
         f"{title} corrects it motor by motor, with an exponent of {told.exponent:.2f}"
         if parameters
+        else f"{title}'s law for each motor leaves {than_law.left_deg:.1f}°, and one "
+        f"{told.regressor} follows them better"
+        if than_law is not None
         else f"{title} multiplies one {told.regressor} for all motors of this compass"
     )
     grade = (
@@ -135,13 +143,19 @@ def _with(row: HeadingError, left: float) -> HeadingError:
     return replace(row, after=float(np.hypot(row.after, left)), p95=float(np.hypot(row.p95, left)))
 
 
-def _drive(
+def _rows(
     recording: Recording, control: Control, samples: Samples, law: MotorLaw
-) -> FloatArray | None:
-    """What drives the law's motors at each reading, shape (n, k); None where others turn too."""
-    drive = drive_of_motors(recording)
-    if drive is None or drive.numbers != law.numbers or control.numbers != law.numbers:
+) -> tuple[FloatArray, FloatArray] | None:
+    """What each motor draws and what drives it near each reading, shape (n, k) both.
+
+    Both as the outputs told them together, for the firmware multiplies what it just told, and not
+    what was to be expected. None where other motors turn than the law has.
+    """
+    found = drawn_and_driven(recording)
+    if found is None or any(each.numbers != law.numbers for each in (*found, control)):
         return None
-    # Row by row what the currents were made of, on their own clock.
-    series = Series(control.series.time, drive.series.value)
-    return np.maximum(interpolate(series, samples.time - samples.lags.regressor), 0.0)
+    drawn, driven = (each.series for each in found)
+    then = samples.time - samples.lags.regressor
+    after = np.clip(np.searchsorted(drawn.time, then), 1, len(drawn) - 1)
+    row = after - (then - drawn.time[after - 1] < drawn.time[after] - then)
+    return drawn.value[row], np.maximum(driven.value[row], 0.0)

@@ -68,6 +68,9 @@ _MOTOR_FUNCTIONS = {
 }
 """SERVOn_FUNCTION to the number of the motor that it drives."""
 
+_PUSHERS = frozenset([70.0, 73.0, 74.0])
+"""SERVOn_FUNCTION: throttle, and a left and a right one."""
+
 _DEFAULT_MOTORS = 4
 _OUTPUTS_ASKED_FOR = 8
 _CURVE_NAMES = ("MOT_THST_EXPO", "MOT_SPIN_MIN", "MOT_SPIN_MAX")
@@ -146,11 +149,12 @@ class ArduPilot:
         thrust = (1 − expo) · c + expo · c².
         """
         functions = [parameters.last(f"SERVO{index + 1}_FUNCTION", 0.0) for index in range(outputs)]
-        driven = {
+        named = {
             index: _MOTOR_FUNCTIONS[function]
             for index, function in enumerate(functions)
             if function in _MOTOR_FUNCTIONS
-        } or {index: index + 1 for index in range(min(_DEFAULT_MOTORS, outputs))}
+        }
+        driven = named or {index: index + 1 for index in range(min(_DEFAULT_MOTORS, outputs))}
         low, high = (
             parameters.last(name, 0.0) or default
             for name, default in zip(_PWM_NAMES, (1000.0, 2000.0), strict=True)
@@ -159,7 +163,9 @@ class ArduPilot:
             return None
         driven = dict(sorted(driven.items(), key=lambda item: item[1]))
         curve = self._thrust_curve(parameters)
-        return MotorOutputs(tuple(driven), low, high, curve, tuple(driven.values()))
+        pushers = tuple(n for n, function in enumerate(functions) if function in _PUSHERS)
+        numbers = tuple(driven.values())
+        return MotorOutputs(tuple(driven), low, high, curve, numbers, pushers, bool(named))
 
     @staticmethod
     def _thrust_curve(parameters: ParameterHistory) -> ThrustCurve | None:

@@ -132,6 +132,10 @@ class MotorOutputs:
         From thrust demand to duty; None where unknown.
     numbers
         The motor that each channel drives, as the firmware counts them, from 1.
+    pushers
+        Indices of the outputs that drive a plane forward.
+    named
+        Whether parameters say so; else these are the channels that usually do.
     """
 
     channels: tuple[int, ...]
@@ -139,6 +143,8 @@ class MotorOutputs:
     high: float
     curve: ThrustCurve | None
     numbers: tuple[int, ...] = ()
+    pushers: tuple[int, ...] = ()
+    named: bool = False
 
 
 @dataclass(frozen=True)

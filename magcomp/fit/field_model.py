@@ -34,8 +34,9 @@ LEANS_S = (2.0, 8.0)
 
 TILT = slice(LAGS.stop, LAGS.stop + 2)
 LEAN = slice(TILT.stop, TILT.stop + 2 * len(LEANS_S))
-NUISANCE = slice(TILT.start, LEAN.stop)
-SIZE = LEAN.stop
+BLUR = LEAN.stop
+NUISANCE = slice(TILT.start, BLUR + 1)
+SIZE = BLUR + 1
 """Parameters where the control quantity has one part; other parts' motor vectors follow."""
 
 DIAGONAL, OFF_DIAGONAL = slice(6, 9), slice(9, 12)
@@ -130,6 +131,7 @@ def _columns(samples: Samples, parameters: FloatArray) -> FloatArray:
     slopes[TILT] = -turned[:2]
     for start, leaning in zip(range(LEAN.start, LEAN.stop, 2), _leaning(samples), strict=True):
         slopes[start : start + 2] = slopes[TILT] * leaning[:, None]
+    slopes[BLUR] = _dot(pulled, _across(correction.added(samples.u_blur))[:, None])
     columns[0] = _dot(axes, (inverse @ (corrected - earth))[:, None])
     columns[0] += np.tensordot(parameters[NUISANCE], slopes[NUISANCE], axes=1)
     columns[1] = np.tensordot(correction.vector, pulled, axes=1)

@@ -25,6 +25,7 @@ from magcomp.earth import EarthField
 from magcomp.fit.control_noise import Noise
 from magcomp.fit.field_model import (
     APPLIED_LAG,
+    BLUR,
     DIAGONAL,
     FIELD_LAG,
     LAGS,
@@ -75,6 +76,9 @@ TILT_WIDTH_RAD = np.radians(0.5)
 
 LEAN_WIDTH = 0.1
 """Radians of attitude error a radian of lean held for seconds."""
+
+BLUR_WIDTH = 1.0
+"""The field may follow the control quantity at once, or as late as its blurred form, or between."""
 
 LAG_MEAN_S, LAG_WIDTH_S, LAG_MOST_S = 0.08, 0.1, 0.6
 """The field and the current are late by some 0.1 s: docs/autopilots.md, ArduPilot: timing."""
@@ -190,7 +194,7 @@ def prior(problem: Problem, free: int) -> Prior:
     width[STRENGTH] = (1e-4 if free >= 3 else SCALE_WIDTH) * earth.strength
     width[SIN_DIP] = DIP_WIDTH
     width[LAGS] = LAG_WIDTH_S
-    width[TILT], width[LEAN] = TILT_WIDTH_RAD, LEAN_WIDTH
+    width[TILT], width[LEAN], width[BLUR] = TILT_WIDTH_RAD, LEAN_WIDTH, BLUR_WIDTH
     return Prior(mean, width)
 
 
@@ -322,6 +326,10 @@ def with_wander(problem: Problem, found: FlightEstimate, free: int) -> tuple[Fli
     likely = max(each, key=lambda groups: each[groups].evidence)
     if not is_physical(answer.parameters):
         answer = each[likely]
+    if not wander.is_clear:
+        # Near the border neither answer is best: where they differ is what is not known.
+        rival = Posterior(found.parameters, found.covariance, answer.evidence, wander)
+        answer = mixed((answer, rival))
     covariance = _SIZES_UNKNOWN**2 * answer.covariance
     moved = 1 if likely == 1 else len(GROUPS)
     return replace(found, parameters=answer.parameters, covariance=covariance), moved

@@ -35,6 +35,7 @@ _TRIED: Mapping[str, tuple[float, ...]] = {
 _ROUNDS = 8
 _NEGLIGIBLE = 0.5
 _LEAST_TILT_RAD, _LEAST_DRIFT_MGAUSS = np.radians(0.12), 0.5
+_CLEAR_DRIFT_MGAUSS = 1.0
 _LOSS_SCALE = 4.0
 _STEPS = 4
 
@@ -64,6 +65,11 @@ class Wander:
     def shows(self) -> bool:
         """Whether there is any to speak of."""
         return self.tilt_rad > _LEAST_TILT_RAD or self.drift_mgauss > _LEAST_DRIFT_MGAUSS
+
+    @property
+    def is_clear(self) -> bool:
+        """Whether there is so much that a model without it is no rival."""
+        return self.tilt_rad > _LEAST_TILT_RAD or self.drift_mgauss > _CLEAR_DRIFT_MGAUSS
 
     def neighbours(self) -> Iterator[Wander]:
         """The same with one number at the next smaller or larger of the values tried."""

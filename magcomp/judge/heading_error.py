@@ -124,9 +124,7 @@ def heading_errors(
     """
     roll, pitch, yaw = attitudes()
     field = _field_at(fit, roll, pitch, yaw)
-    draws = rng.multivariate_normal(
-        np.zeros(CORRECTION_SIZE), fit.shared_covariance, size=_DRAWS, method="eigh"
-    )
+    draws = rng.standard_normal((_DRAWS, CORRECTION_SIZE)) @ _root(fit.shared_covariance)
     inverse = np.linalg.inv(fit.correction.soft_iron)
     rows = []
     for u, u_present in zip(control_grid(fit), present_u, strict=True):
@@ -144,6 +142,12 @@ def heading_errors(
             )
         )
     return tuple(rows)
+
+
+def _root(covariance: FloatArray) -> FloatArray:
+    """The symmetric square root, shape (k, k): an eigenvector's sign, which is chance, cancels."""
+    values, vectors = np.linalg.eigh(covariance)
+    return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)
 
 
 def variance_shares(fit: MotorFit, u: float) -> dict[str, float]:

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-FEWEST = 3
-"""Analyses before anything is foretold: two always lie on a curve."""
+FEWEST = 2
+"""Analyses before anything is foretold."""
 
 _LAST = 12
 _SPAN = 1.2
@@ -33,7 +33,7 @@ def seconds_until(goal_deg: float, history: Sequence[tuple[float, float]]) -> fl
     -----
     What is random averages out and what is systematic stays: b² = f² + c / t (docs/method.md,
     How long to record). f² and c are the least squares of the relative errors of the last twelve
-    b², neither below 0.
+    b², neither below 0; f is 0 where there are two, which always lie on a curve.
 
     Examples
     --------
@@ -47,7 +47,12 @@ def seconds_until(goal_deg: float, history: Sequence[tuple[float, float]]) -> fl
     inverse, square = np.array([(1.0 / t, b * b) for t, b in last]).T
     rows = np.column_stack([np.ones(len(last)), inverse]) / square[:, None]
     floor, slope = np.linalg.lstsq(rows, np.ones(len(last)))[0].tolist()
-    if floor < 0.0:
+    if floor < 0.0 or len(last) == FEWEST:
         floor, slope = 0.0, float(rows[:, 1].sum() / (rows[:, 1] @ rows[:, 1]))
     random = goal_deg**2 - floor
-    return slope / random if slope > 0.0 and random > 0.0 else None
+    if slope <= 0.0 or random <= 0.0:
+        return None
+    seconds, bound = last[-1]
+    until = slope / random
+    # Foretold for a time that is over: then the newest bound alone tells.
+    return until if until > seconds or bound <= goal_deg else seconds * (bound / goal_deg) ** 2

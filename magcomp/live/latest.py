@@ -19,6 +19,8 @@ _FIRST_COMPASS = (Message.RAW_IMU, Message.SCALED_IMU)  # which of them depends 
 _OTHER_COMPASSES = {2: Message.SCALED_IMU2, 3: Message.SCALED_IMU3}
 _STALE_US = 2_000_000
 _MOST_SENDERS = 64
+_MOST_PARAMETERS = 8_000
+"""Firmwares have some 1500; who sends more names than this invents them."""
 _MILLI_G = 9.80665e-3
 
 Vector = tuple[float, float, float]
@@ -87,8 +89,14 @@ class Latest:
                 self._make_room()
             self._frames.setdefault(sender, {})[message] = (unix_us, frame)
             if message == Message.PARAM_VALUE:
-                sent = payload(frame)
-                self._parameters.setdefault(sender, {})[name_and_field(sent)[0]] = sent
+                self._keep(self._parameters.setdefault(sender, {}), payload(frame))
+
+    @staticmethod
+    def _keep(known: dict[bytes, bytes], sent: bytes) -> None:
+        """Take a parameter's value; a flood of names must cost no memory either."""
+        name = name_and_field(sent)[0]
+        if name in known or len(known) < _MOST_PARAMETERS:
+            known[name] = sent
 
     def _make_room(self) -> None:
         """Forget who has been silent longest: a flood of senders must cost no memory."""

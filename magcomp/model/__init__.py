@@ -50,6 +50,7 @@ from magcomp.model.recording import (
     Vehicle,
     compasses_of,
     interpolate,
+    running_mean,
 )
 from magcomp.model.samples import (
     Control,
@@ -108,6 +109,7 @@ __all__ = [
     "median",
     "pack",
     "quantity_of",
+    "running_mean",
     "symmetric",
     "unit_of",
     "unpack",

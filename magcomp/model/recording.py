@@ -57,6 +57,30 @@ def interpolate(series: Series, time: FloatArray) -> FloatArray:
     return np.array([np.interp(time, series.time, column) for column in series.value.T]).T
 
 
+def running_mean(series: Series, half_width: float) -> Series:
+    """Mean over a window in time, shape (n,) or (n, k).
+
+    Parameters
+    ----------
+    series
+        Its times never decrease.
+    half_width
+        Of the window, seconds.
+
+    Examples
+    --------
+    >>> steps = Series(np.array([0.0, 1.0, 2.0]), np.array([0.0, 3.0, 9.0]))
+    >>> running_mean(steps, 1.0).value.tolist()
+    [1.5, 4.0, 6.0]
+    """
+    total = np.zeros((len(series) + 1, *series.value.shape[1:]))
+    np.cumsum(series.value, axis=0, out=total[1:])
+    first = np.searchsorted(series.time, series.time - half_width, side="left")
+    last = np.searchsorted(series.time, series.time + half_width, side="right")
+    count = (last - first).reshape(-1, *[1] * (series.value.ndim - 1))
+    return Series(series.time, (total[last] - total[first]) / count)
+
+
 @dataclass(frozen=True)
 class Compass:
     """A compass of a vehicle, as its parameters describe it.

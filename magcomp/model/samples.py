@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 
 import numpy as np
 
-from magcomp.model.recording import BoolArray, FloatArray, IntArray, Series
+from magcomp.model.recording import BoolArray, FloatArray, IntArray, Series, running_mean
+
+BLUR_S = 0.2
+"""A reading is a mean over a tenth of a second, and motors follow their outputs within two."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,6 +117,11 @@ class Control:
     origin: str
     numbers: tuple[int, ...] = ()
     unsure: float = 0.0
+
+    @cached_property
+    def blurred(self) -> Series:
+        """Its mean over :data:`BLUR_S` before and after each moment."""
+        return running_mean(self.series, BLUR_S)
 
     @property
     def parts(self) -> int:
@@ -240,6 +249,8 @@ class Samples:
         Parts of the control quantity, shape (n, k).
     u_rate
         Their change per second, shape (n, k).
+    u_blur
+        What :attr:`Control.blurred` differs from them by, shape (n, k).
     """
 
     compass: int
@@ -253,6 +264,7 @@ class Samples:
     down_rate: FloatArray
     u: FloatArray
     u_rate: FloatArray
+    u_blur: FloatArray
 
     def __len__(self) -> int:
         return len(self.time)

@@ -11,7 +11,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from magcomp.align import controls, currents_of_motors, readings, sample, to_undo
+from magcomp.align import (
+    controls,
+    currents_of_motors,
+    on_lift_alone,
+    readings,
+    sample,
+    to_undo,
+)
 from magcomp.errors import MissingDataError
 from magcomp.fit import departures, residuals
 from magcomp.geometry import heading
@@ -173,6 +180,7 @@ def _samples(
     recording: Recording, fit: MotorFit, start: float, end: float
 ) -> tuple[Samples, InForce, Mapping[str, Control]]:
     """The readings as the fit saw them, what was in force at their end, and what it multiplies."""
+    recording, _ = on_lift_alone(recording)
     found = controls(recording)
     forms = currents_of_motors(recording) if fit.numbers else found
     control = _control(forms, fit, recording.source)

@@ -161,3 +161,13 @@ def test_every_row_that_was_flown_and_the_verdict_have_a_say(by_motor, grade, be
     now = Judged(None, fit, replace(verdict, grade=Grade.MARGINAL, heading_error=table(1, 1, 1)))
     new = Judged(None, fit, replace(verdict, grade=grade, heading_error=table(*by_motor)))
     assert is_better(new, now, 2.0) is better
+
+
+def test_a_law_that_follows_worse_than_one_current_is_not_written():
+    """Currents far steeper than the law's exponent goes, of motors that hardly differ."""
+    hardly = VECTORS.mean(axis=0) + 0.02 * VECTORS
+    steep = replace(LAW, vectors=hardly, exponent=6.0)
+    (result,) = analyse(steep.recording(), BY_MOTOR).compasses
+    assert result.as_written.regressor == "current"
+    assert any("one current follows them better" in why for why in result.verdict.reasons)
+    assert not any(name.startswith("COMPASS_PMOT") for name in result.insisted if "EN" not in name)

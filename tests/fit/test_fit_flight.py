@@ -65,6 +65,14 @@ def test_a_wrong_motor_compensation_in_force_is_undone_first_with_the_lag_it_had
     assert undone.lags.applied == pytest.approx(flown.current_lag + later, abs=0.02)
 
 
+def test_a_field_that_follows_the_current_blurred_leaves_the_motor_vector_its_length():
+    """What passes too fast for compass and motors is not taken for a smaller slope."""
+    fast = {"seed": 4, "current_hz": 25.0, "fast_s": 0.8, "noise": 0.5}
+    sharp, blurred = (fit(Flown(**fast, blur=s).problem(), "flight") for s in (0.0, 0.15))
+    shorter = 1.0 - np.linalg.norm(blurred.interference) / np.linalg.norm(sharp.interference)
+    assert abs(shorter) < 0.005
+
+
 def test_the_covariance_of_a_flight_is_what_repetition_shows():
     weights = [
         weighed(fit(Flown(seed=100 + s, seconds=90.0).problem(), "flight"), slice(0, 3))
@@ -101,7 +109,7 @@ def test_a_poor_flight_leans_on_the_calibration_in_force(seed):
 
 @pytest.mark.parametrize("compensated", [False, True], ids=["off", "current in force"])
 def test_the_stated_derivatives_are_those_of_the_residuals(compensated):
-    """All 23: motor, offset, soft iron, strength, dip, the three lags, tilt and lean."""
+    """All 24: motor, offset, soft iron, strength, dip, the lags, tilt, lean and blur."""
     in_force = None
     if compensated:
         wrong = replace(EXACT, motor=np.array([3.0, 2.0, -1.0]))
@@ -122,7 +130,7 @@ def test_the_stated_derivatives_are_those_of_the_residuals(compensated):
             np.full(3, 1e-2),
             np.full(6, 1e-5),
             [1e-2, 1e-5, 0.04, 0.04, 0.04],
-            np.full(6, 1e-3),
+            np.full(7, 1e-3),
         ]
     )
     inside = slice(10, -10)

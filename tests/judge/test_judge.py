@@ -132,6 +132,23 @@ def test_no_doubt_leaves_no_error_and_twice_the_doubt_twice_the_bound():
         assert four.before == one.before
 
 
+def test_an_eigenvectors_sign_is_chance_and_moves_no_bound(monkeypatch):
+    found = fit(Flown(seed=1).problem(), "flight")
+    grid, solved = np.arange(0.0, 60.0, 10.0), np.linalg.eigh
+
+    def bounds():
+        rows = heading_errors(found, found.correction, grid, np.random.default_rng(1))
+        return [row.p95 for row in rows]
+
+    def flipped(matrix):
+        values, vectors = solved(matrix)
+        return values, vectors * np.where(np.arange(len(values)) % 2, 1.0, -1.0)
+
+    before = bounds()
+    monkeypatch.setattr(np.linalg, "eigh", flipped)
+    assert bounds() == pytest.approx(before, rel=1e-9)
+
+
 def test_the_bound_is_the_95_per_cent_quantile():
     """Of one doubtful number: 1.960 standard errors, where the median is 0.674."""
     found = fit(Flown(seed=1).problem(), "flight")

@@ -32,7 +32,7 @@ def test_a_bound_that_follows_the_law_reaches_its_goal_when_foretold(floor, slop
     "history",
     [
         [],
-        law(0.0, 100.0)[:2],
+        law(0.0, 100.0)[:1],
         law(0.6, 100.0),
         [(t, 2.0) for t in TIMES],
         [(t, t) for t in TIMES],
@@ -40,10 +40,23 @@ def test_a_bound_that_follows_the_law_reaches_its_goal_when_foretold(floor, slop
         [(t, math.inf) for t in TIMES],
         [(0.0, 2.0 - 0.1 * step) for step in range(5)],
     ],
-    ids=["none", "two", "floor", "steady", "rising", "moments", "infinite", "on the ground"],
+    ids=["none", "one", "floor", "steady", "rising", "moments", "infinite", "on the ground"],
 )
 def test_nothing_is_foretold_of_a_bound_that_gives_no_reason(history):
     assert seconds_until(0.5, history) is None
+
+
+def test_two_bounds_are_taken_for_all_random():
+    until = seconds_until(0.5, [(20.0, 3.0), (45.0, 2.0)])
+    assert seconds_until(0.5, [(20.0, 3.0), (45.0, 3.0 * math.sqrt(20.0 / 45.0))]) == (
+        pytest.approx(720.0)
+    )
+    assert until == pytest.approx(720.0, rel=0.01)
+
+
+def test_a_goal_that_is_not_reached_yet_is_not_foretold_for_the_past():
+    late = [(20.0, 1.0), (40.0, 0.6), (60.0, 0.45), (80.0, 0.4), (100.0, 0.55)]
+    assert seconds_until(0.5, late) == pytest.approx(100.0 * 1.1**2)
 
 
 def test_a_bound_that_jitters_is_foretold_about_as_one_that_does_not():

@@ -8,6 +8,7 @@ import pytest
 from link_vehicle import UNIX_US, FakeVehicle
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from magcomp.live import latest as latest_module
 from magcomp.live.latest import Latest
 from magcomp.live.snapshot import slow_streams
 from magcomp.model import Vehicle
@@ -68,6 +69,16 @@ def test_the_accelerometer_is_read_in_metres_per_second_squared():
     raw = mavlink.MAVLink_raw_imu_message(0, 100, -200, -1000, 0, 0, 0, 1, 2, 3)
     latest.add(1, bytes(raw.pack(mavlink.MAVLink(None, 1, 1))))
     assert latest.now(VEHICLE).accel == pytest.approx((0.980665, -1.96133, -9.80665))
+
+
+def test_a_flood_of_names_costs_no_memory_and_forgets_no_value(monkeypatch):
+    monkeypatch.setattr(latest_module, "_MOST_PARAMETERS", 5)
+    latest, ours = Latest(), FakeVehicle()
+    for number in range(9):
+        for value in (float(number), number + 0.5):
+            told = mavlink.MAVLink_param_value_message(b"P%d" % number, value, 9, 9, number)
+            latest.add(UNIX_US, ours.pack(told))
+    assert latest.parameters(VEHICLE) == {f"P{n}": n + 0.5 for n in range(5)}
 
 
 def test_a_flood_of_senders_costs_no_memory_and_forgets_no_vehicle_that_speaks():

@@ -1,0 +1,84 @@
+"""A quadplane's forward flight is told from its hover, and never mixed into one vector."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from synthetic import INTERFERENCE
+from unequal import Unequal
+
+from magcomp.align.phases import on_lift_alone
+from magcomp.analysis.analyse import Options, analyse
+from magcomp.model import ParameterChange, ParameterHistory, Series
+
+FROM, UNTIL = 60.0, 100.0
+PUSHED = np.array([-2.0, 1.5, 1.0])
+"""What the pusher's current adds, mGauss per A, in the place of the lift motors'."""
+
+FUNCTIONS = {
+    **{f"SERVO{n}_FUNCTION": 0.0 for n in (1, 2, 4)},
+    "SERVO3_FUNCTION": 70.0,
+    **{f"SERVO{4 + n}_FUNCTION": 32.0 + n for n in (1, 2, 3, 4)},
+}
+
+
+def quadplane(*, forward=True, functions=FUNCTIONS):
+    flown = Unequal(seed=1, vectors=np.tile(INTERFERENCE, (4, 1)))
+    made = flown.recording()
+    time, lift = made.outputs.time, made.outputs.value[:, :4]
+    pushed = (time > FROM) & (time < UNTIL) & forward
+    outputs = np.zeros((len(time), 16))
+    outputs[:, 4:8] = np.where(pushed[:, None], 1000.0, lift)
+    outputs[:, 2] = np.where(pushed, 1700.0, 1000.0)
+    field = made.field[1]
+    within = (field.time > FROM) & (field.time < UNTIL) & forward
+    added = flown.current_at(field.time - flown.current_lag)[:, None] * (PUSHED - INTERFERENCE)
+    changes = [ParameterChange(0.0, name, value) for name, value in functions.items()]
+    rest = (c for c in made.parameters.changes if not c.name.startswith("SERVO"))
+    return replace(
+        made,
+        vehicle=replace(made.vehicle, kind="plane"),
+        outputs=Series(time, outputs),
+        field={1: Series(field.time, field.value + within[:, None] * added)},
+        parameters=ParameterHistory((*rest, *changes)),
+    )
+
+
+def test_readings_and_current_of_forward_flight_are_left_out_and_said_so():
+    hover, told = on_lift_alone(quadplane())
+    assert "holds for hovering" in told
+    for series in (hover.field[1], hover.current):
+        assert not np.any((series.time > FROM) & (series.time < UNTIL))
+        assert np.any(series.time < FROM - 2.0)
+        assert np.any(series.time > UNTIL + 2.0)
+
+
+def test_a_pusher_beside_running_lift_motors_is_left_out_too():
+    recording = quadplane()
+    value = recording.outputs.value.copy()
+    value[:, 4:8] = np.maximum(value[:, 4:8], 1400.0)
+    hover, told = on_lift_alone(replace(recording, outputs=Series(recording.outputs.time, value)))
+    assert told
+    assert not np.any((hover.field[1].time > FROM) & (hover.field[1].time < UNTIL))
+
+
+@pytest.mark.parametrize(
+    "recording",
+    [
+        quadplane(forward=False),
+        replace(quadplane(), vehicle=Unequal(seed=1).recording().vehicle),
+        quadplane(functions={}),
+        replace(quadplane(), outputs=None),
+    ],
+    ids=["never forward", "a copter", "no lift motors named", "no outputs"],
+)
+def test_what_has_no_two_phases_stays_as_it_is(recording):
+    assert on_lift_alone(recording) == (recording, "")
+
+
+def test_the_hovers_vector_is_found_beside_forward_flight():
+    found = analyse(quadplane(), Options(regressor="current"))
+    assert np.linalg.norm(found.compasses[0].fit.interference - INTERFERENCE) < 0.15
+    assert any("a pusher drives the vehicle" in note for note in found.notes)
