@@ -164,7 +164,7 @@ def analyse(
     chosen = MOTORS if MOTORS in judged else better(judged)
     answers = [as_written(recording, each) for each in judged[chosen]]
     forms_of = compared(judged, motors, reported(found).get(THROTTLE))
-    if wanted.regressor == "auto" and chosen == CURRENT:
+    if wanted.regressor == "auto" and quantity_of(chosen).of_each:
         answers = motors_where_better(
             recording,
             answers,

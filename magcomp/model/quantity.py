@@ -65,6 +65,8 @@ class Quantity:
         How a log comes to hold it, behind a sentence that says it is not there.
     is_told
         Whether it can be told from one reading of throttle and battery current.
+    of_each
+        The quantity that is this one told motor by motor; empty where none is.
     """
 
     name: str
@@ -84,6 +86,7 @@ class Quantity:
     single: str
     how_to_have: str = ""
     is_told: bool = True
+    of_each: str = ""
 
     def text(self, u: float) -> str:
         """A value with its unit.
@@ -146,6 +149,7 @@ _AMPERES = Quantity(
     flies=0.0,
     how_to_vary="fly climbs and descents so that the motors work harder and less hard",
     single=CURRENT,
+    of_each=MOTORS,
 )
 _SHARE = Quantity(
     name=THROTTLE,
@@ -165,10 +169,11 @@ _SHARE = Quantity(
     single=THROTTLE,
 )
 
-_EACH = replace(_AMPERES, name=MOTORS)
+_EACH = replace(_AMPERES, name=MOTORS, of_each="")
 _DRIVEN = replace(
     _AMPERES,
     name=DRIVE,
+    of_each="",
     unit="V",
     shown_unit="V",
     is_told=False,
