@@ -45,10 +45,12 @@ def table(written):
     return json.loads((written / "table.json").read_text())
 
 
+@pytest.mark.slow
 def test_the_table_is_as_the_schema_says(table):
     must_be("reproduction", table)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_row_for_each_of_the_papers_control_quantities(table, kind):
     assert [row["control"] for row in table[kind]] == list(CONTROLS)
@@ -56,12 +58,14 @@ def test_a_row_for_each_of_the_papers_control_quantities(table, kind):
         assert set(row) == {field.name for field in fields(Row)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_currents_are_about_the_papers(table, kind):
     for row, paper in zip(table[kind], TABLE_1, strict=True):
         assert row["current_a"] == pytest.approx(paper.current_a, abs=2.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_ellipsoid_alone_grows_wrong_with_the_control_quantity(table, kind):
     rest, middle, full = (row["ellipsoid_deg"] for row in table[kind])
@@ -70,6 +74,7 @@ def test_the_ellipsoid_alone_grows_wrong_with_the_control_quantity(table, kind):
     assert full > middle + 2.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("method", ["paper_deg", "magcomp_deg"])
 def test_following_the_centre_along_its_line_stays_flat(table, kind, method):
@@ -78,17 +83,20 @@ def test_following_the_centre_along_its_line_stays_flat(table, kind, method):
     assert max(values) < 0.1 * table[kind][-1]["ellipsoid_deg"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_magcomp_stays_at_or_under_half_a_degree_at_every_control_quantity(table, kind):
     assert all(row["magcomp_deg"] <= PROMISED_DEG for row in table[kind])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_nothing_helps_as_little_as_no_correction(table, kind):
     for row in table[kind]:
         assert row["uncorrected_deg"] > max(row["ellipsoid_deg"], row["paper_deg"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_in_flight_compensation_brings_the_heading_within_the_papers_3_degrees(table, kind):
     flown = table["flights"][kind]
@@ -98,6 +106,7 @@ def test_in_flight_compensation_brings_the_heading_within_the_papers_3_degrees(t
     assert flown["paths_apart_m"] > 1.0
 
 
+@pytest.mark.slow
 def test_the_page_needs_nothing_from_elsewhere(written):
     page = (written / "index.html").read_text()
     assert len(page) < 5_000_000
@@ -120,6 +129,7 @@ def test_the_page_stands_up_in_a_browser(written, tmp_path):
             assert axe_findings(browser) == []
 
 
+@pytest.mark.slow
 def test_the_pages_numbers_are_those_of_the_table(written, table):
     page = (written / "index.html").read_text()
     shown = re.findall(r'<data value="([^"]+)" data-key="(\w+)\.(\d)\.(\w+)"', page)
@@ -128,6 +138,7 @@ def test_the_pages_numbers_are_those_of_the_table(written, table):
         assert float(value) == table[kind][int(row)][key]
 
 
+@pytest.mark.slow
 def test_an_existing_table_is_not_overwritten(written, capsys):
     before = (written / "table.json").read_bytes()
     assert run(["reproduce", "-o", str(written)]) == 2
@@ -135,7 +146,8 @@ def test_an_existing_table_is_not_overwritten(written, capsys):
     assert (written / "table.json").read_bytes() == before
 
 
-@pytest.mark.parametrize("seed", [2, *(pytest.param(n, marks=pytest.mark.slow) for n in (3, 4))])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [2, 3, 4])
 def test_the_claims_do_not_depend_on_the_vehicle(seed, tmp_path):
     log = tmp_path / "turntable.tlog"
     write_tlog(log, program="turntable_paper", seed=seed)

@@ -180,6 +180,7 @@ def test_the_bound_stated_for_a_simulated_vehicle_holds_over_its_compasses(drawn
     assert root_mean_square(true.max(axis=1)) <= root_mean_square(bound.max(axis=1))
 
 
+@pytest.mark.slow
 def test_a_simulated_sweep_finds_the_interference_vector_within_one_per_cent(tmp_path):
     given = simulate(simulated.SWEEP, tmp_path)
     for number in COMPASSES:

@@ -48,6 +48,7 @@ class Watched:
         return np.abs(np.degrees(wrap_angle(np.radians([r[name] for r in known]) - yaw)))
 
 
+@pytest.mark.slow
 def test_a_live_vehicle_s_fused_heading_is_its_true_one(tmp_path, capsys, monkeypatch):
     vehicle = Vehicle(scenario("flight", 4), wait_for_ground=True)
     # However slow the computer is, thirty seconds are the vehicle's.

@@ -27,7 +27,7 @@ from magcomp.writing.journal import read_journal
 MESSAGES = 290
 """Parameter messages, both ways, of one whole upload; a test below proves that it is enough."""
 
-EVERY = int(os.environ.get("MAGCOMP_EVERY", "50"))
+EVERY = int(os.environ.get("MAGCOMP_EVERY", "100"))
 OLD_MOTOR = {f"COMPASS_MOT{n}_{axis}": 0.75 for n in ("", "2", "3") for axis in "XYZ"}
 PATIENCE_S = 60.0
 

@@ -174,6 +174,7 @@ class TestSelfContained:
     def test_it_is_smaller_than_five_megabytes(self, make) -> None:
         assert len(page_of(make).encode()) < MOST_BYTES
 
+    @pytest.mark.slow
     def test_three_compasses_turned_at_five_levels_stay_below_five_megabytes(self) -> None:
         made = case("turntable_five_levels")
         assert len(made.analysis.compasses) == 3
