@@ -20,30 +20,27 @@ from magcomp.earth import EarthField, expected_field
 from magcomp.geometry import body_from_earth
 from magcomp.judge import largest_shift
 from magcomp.judge.heading_error import attitudes
-from magcomp.model import CURRENT, CompassResult, Correction
+from magcomp.model import CURRENT, CompassResult, Correction, symmetric
 from magcomp.simulate import Truth, write_tlog
 from magcomp.sources import read
 
 
 def true_error(
-    truth: Truth, exact: Correction, result: CompassResult, earth: EarthField, u: float
+    truth: Truth, exact: Correction, fitted: Correction, earth: EarthField, u: float
 ) -> float:
-    """Largest heading error the fitted correction leaves at a current, degrees."""
+    """Largest heading error a correction leaves at a current that all motors share, degrees."""
     roll, pitch, yaw = attitudes()
     field = body_from_earth(roll, pitch, yaw) @ earth.ned
     disturbed = field + u * np.asarray(truth.interference)
     raw = disturbed @ np.linalg.inv(exact.soft_iron).T - exact.offset
-    corrected = result.fit.correction.apply(raw, np.full(len(raw), u))
+    corrected = fitted.apply(raw, np.full(len(raw), u))
     return largest_shift(corrected, field, roll, pitch)
 
 
 def exact_correction(truth: Truth, compass: int) -> Correction:
     """What the simulated sensor needs, from its truth in the form of sitl_fixtures/*.json."""
     values = truth.as_json()["compass"][compass - 1]
-    diagonal, off = values["dia"], values["odi"]
-    soft_iron = np.diag(diagonal).astype(float)
-    for value, (i, j) in zip(off, ((0, 1), (0, 2), (1, 2)), strict=True):
-        soft_iron[i, j] = soft_iron[j, i] = value
+    soft_iron = symmetric(np.array([*values["dia"], *values["odi"]]))
     return Correction(np.array(values["ofs"]), soft_iron, np.zeros(3))
 
 
@@ -85,7 +82,7 @@ def _judge(
             continue
         exact = exact_correction(truth, result.fit.compass)
         for row in result.verdict.heading_error:
-            found = true_error(truth, exact, result, earth, row.u)
+            found = true_error(truth, exact, result.fit.correction, earth, row.u)
             ratios.append(found / row.p95 if row.p95 > 0 else float(found > 1e-6))
             if row.u == 50.0:
                 print(f"{name:<20}{seed:>5}{found:>9.2f}{row.p95:>9.2f}")

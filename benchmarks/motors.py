@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from coverage import exact_correction
+from coverage import exact_correction, true_error
 
 from magcomp.align import (
     controls,
@@ -25,13 +25,9 @@ from magcomp.align import (
     thinned,
     to_undo,
 )
-from magcomp.earth import EarthField
 from magcomp.fit import Problem, best_form, fit
-from magcomp.geometry import body_from_earth
-from magcomp.judge import largest_shift
-from magcomp.judge.heading_error import attitudes
-from magcomp.model import CURRENT, Correction, FloatArray, MotorFit, Recording
-from magcomp.simulate import Truth, write_tlog
+from magcomp.model import CURRENT, FloatArray, MotorFit, Recording
+from magcomp.simulate import write_tlog
 from magcomp.sources import read
 
 COMPASS = 1
@@ -48,17 +44,6 @@ def fits_of(recording: Recording) -> tuple[MotorFit, MotorFit]:
         for forms in (by_current, currents_of_motors(recording))
     )
     return one, each
-
-
-def error_at_top(truth: Truth, earth: EarthField, correction: Correction, top: float) -> float:
-    """Largest heading error where each motor draws its share of the largest current, degrees."""
-    exact = exact_correction(truth, COMPASS)
-    roll, pitch, _ = attitudes()
-    field = body_from_earth(*attitudes()) @ earth.ned
-    share = np.full((len(field), len(truth.motors)), top / len(truth.motors))
-    raw = (field + share @ truth.motors) @ np.linalg.inv(exact.soft_iron).T - exact.offset
-    parts = share if correction.motor.shape[1] > 1 else share.sum(axis=1)
-    return largest_shift(correction.apply(raw, parts), field, roll, pitch)
 
 
 def line(name: str, values: Sequence[float] | FloatArray) -> str:
@@ -84,9 +69,9 @@ def main() -> None:
             )
             recording = read(log)
             one, each = fits_of(recording)
-            earth = expected_earth(recording)
+            earth, exact = expected_earth(recording), exact_correction(truth, COMPASS)
             errors.append(
-                [error_at_top(truth, earth, f.correction, one.u_high) for f in (one, each)]
+                [true_error(truth, exact, f.correction, earth, one.u_high) for f in (one, each)]
             )
             off = -each.correction.motor.T - truth.motors
             apart.append(np.linalg.norm(off, axis=1) / np.linalg.norm(truth.motors, axis=1))

@@ -32,8 +32,8 @@ from magcomp.align.low_pass import low_pass
 from magcomp.analysis import analyse
 from magcomp.autopilots import ardupilot
 from magcomp.earth import expected_field
-from magcomp.model import CURRENT, Correction, FloatArray, Grade, Recording, Series
-from magcomp.simulate import Truth, write_tlog
+from magcomp.model import CURRENT, FloatArray, Grade, Recording, Series
+from magcomp.simulate import write_tlog
 from magcomp.sources import read
 
 LIMIT_DEG = 2.0
@@ -103,27 +103,17 @@ def rows_of(
             continue
         exact = exact_correction(truth, result.fit.compass)
         flown = [row for row in result.verdict.heading_error if row.u <= result.fit.u_high]
-        errors = [true_error(truth, exact, result, earth, row.u) for row in flown]
-        in_force = replace(result, fit=replace(result.fit, correction=result.in_force))
-        before = [true_error(truth, exact, in_force, earth, row.u) for row in flown]
-        pairs = tuple(zip((row.p95 for row in flown), errors, strict=True))
-        spread = covariance(
-            simulated, _whole(exact, truth), earth.ned, sizes, calibrated=calibrated
+        errors, before = (
+            [true_error(truth, exact, correction, earth, row.u) for row in flown]
+            for correction in (result.fit.correction, result.in_force)
         )
-        guesses = [
-            replace(
-                result, fit=replace(result.fit, correction=drawn(_whole(exact, truth), spread, rng))
-            )
-            for _ in range(DRAWS)
-        ]
+        pairs = tuple(zip((row.p95 for row in flown), errors, strict=True))
+        whole = replace(exact, motor=-np.asarray(truth.interference).reshape(3, 1))
+        spread = covariance(simulated, whole, earth.ned, sizes, calibrated=calibrated)
+        guesses = [drawn(whole, spread, rng) for _ in range(DRAWS)]
         ideal = np.median([true_error(truth, exact, g, earth, flown[-1].u) for g in guesses])
         beyond = errors[-1] / max(float(ideal), 1e-3)
         yield Row(result.verdict.grade, pairs, max(errors), max(before), beyond)
-
-
-def _whole(exact: Correction, truth: Truth) -> Correction:
-    """The exact correction with its motor vector."""
-    return replace(exact, motor=-np.asarray(truth.interference).reshape(3, 1))
 
 
 def _sizes(noise: float, scale: float) -> Sizes:
