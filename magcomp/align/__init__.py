@@ -11,7 +11,6 @@ from magcomp.align.motors import (
 from magcomp.align.phases import on_lift_alone
 from magcomp.align.readings import readings, thinned, within
 from magcomp.align.sample import sample
-from magcomp.model import interpolate
 
 __all__ = [
     "controls",
@@ -20,7 +19,6 @@ __all__ = [
     "drive_of_motors",
     "expected_earth",
     "has_position",
-    "interpolate",
     "on_lift_alone",
     "readings",
     "reported",

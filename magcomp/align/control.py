@@ -96,7 +96,7 @@ def controls(recording: Recording) -> tuple[Control, ...]:
         are the same quantity, differently sampled; the fit decides which explains the field.
     """
     found: list[Control] = []
-    motors = _motors(recording)
+    motors = motors_of(recording)
     duty = _duty(recording.outputs, motors)
     if recording.current is not None and _varies(recording.current):
         of_escs = recording.battery == SPEED_CONTROLLERS
@@ -156,7 +156,7 @@ def _duty(outputs: Series | None, motors: MotorOutputs | None) -> Series | None:
 
 def duty_of(recording: Recording) -> Duty | None:
     """How hard each motor is driven; None where the recording does not tell."""
-    motors = _motors(recording)
+    motors = motors_of(recording)
     duty = _duty(recording.outputs, motors)
     if recording.outputs is None or motors is None or duty is None:
         return None
@@ -170,7 +170,8 @@ def _running(outputs: Series, motors: MotorOutputs) -> BoolArray:
     return np.asarray(outputs.value[:, list(motors.channels)].any(axis=0))
 
 
-def _motors(recording: Recording) -> MotorOutputs | None:
+def motors_of(recording: Recording) -> MotorOutputs | None:
+    """Which outputs drive motors, and how; None where the recording or its firmware tell none."""
     if recording.outputs is None:
         return None
     count = recording.outputs.value.shape[1]

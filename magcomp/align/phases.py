@@ -10,8 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from magcomp import autopilots
-from magcomp.align.control import duty_of
+from magcomp.align.control import duty_of, motors_of
 from magcomp.model import BoolArray, FloatArray, Recording, Series
 
 _RESTING = 0.03
@@ -64,8 +63,7 @@ def _pushed(recording: Recording) -> tuple[FloatArray, BoolArray, float] | None:
     outputs, current = recording.outputs, recording.current
     if recording.vehicle.kind != "plane" or outputs is None or current is None or not len(current):
         return None
-    motors = autopilots.of(recording).motor_outputs(recording.parameters, outputs.value.shape[1])
-    duty = duty_of(recording)
+    motors, duty = motors_of(recording), duty_of(recording)
     if motors is None or not motors.named or duty is None:
         return None
     time = outputs.time

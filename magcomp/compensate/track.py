@@ -8,14 +8,23 @@ from typing import Literal
 
 import numpy as np
 
-from magcomp.align import controls, expected_earth, interpolate, readings, reported, to_undo
+from magcomp.align import controls, expected_earth, readings, reported, to_undo
 from magcomp.compensate.compensator import Compensator
 from magcomp.compensate.fusion import Fusion, Motion, Reading, Tuning, fuse
 from magcomp.errors import MissingDataError
 from magcomp.fit import Problem, best_form, solvable
 from magcomp.fit.flight import estimate_lags
 from magcomp.geometry import gravity_direction, heading
-from magcomp.model import CURRENT, Control, Correction, FloatArray, Recording, Samples, Series
+from magcomp.model import (
+    CURRENT,
+    Control,
+    Correction,
+    FloatArray,
+    Recording,
+    Samples,
+    Series,
+    interpolate,
+)
 
 Gravity = Literal["attitude", "accelerometer"]
 """Where the fusion takes the direction of gravity from."""

@@ -13,7 +13,6 @@ from functools import reduce
 
 import numpy as np
 
-from magcomp.align import interpolate
 from magcomp.fit import Problem, folds, spread
 from magcomp.fit.field_model import (
     correction_at,
@@ -35,6 +34,7 @@ from magcomp.model import (
     MotorFit,
     Samples,
     Series,
+    interpolate,
 )
 
 CLEARLY = 0.97

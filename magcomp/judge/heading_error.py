@@ -6,7 +6,6 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from magcomp.align import interpolate
 from magcomp.fit.nearest import moved, nearest
 from magcomp.geometry import body_from_earth, heading_shift, level_matrix, wrap_angle
 from magcomp.model import (
@@ -21,6 +20,7 @@ from magcomp.model import (
     InForce,
     MotorFit,
     Samples,
+    interpolate,
     quantity_of,
     symmetric,
 )

@@ -8,8 +8,16 @@ import numpy as np
 import pytest
 from synthetic import Flown, problem_of
 
-from magcomp.align import controls, interpolate, reported
-from magcomp.model import CURRENT, THROTTLE, ParameterChange, ParameterHistory, Recording, Series
+from magcomp.align import controls, reported
+from magcomp.model import (
+    CURRENT,
+    THROTTLE,
+    ParameterChange,
+    ParameterHistory,
+    Recording,
+    Series,
+    interpolate,
+)
 
 CURVE = {"MOT_THST_EXPO": 0.65, "MOT_SPIN_MIN": 0.15, "MOT_SPIN_MAX": 0.95}
 LIMITS = {"MOT_PWM_MIN": 1000.0, "MOT_PWM_MAX": 2000.0}
