@@ -81,6 +81,8 @@ class LiveSnapshot:
     recorded_s
         Seconds of the vehicle's own clock in which attitudes came: it stands while the link is
         lost.
+    armed_until_s
+        The second of these at which the motors ran last; 0 where they never did.
     recording_path, recording_bytes
         The .tlog being written; None and 0 without one.
     recording
@@ -135,6 +137,7 @@ class LiveSnapshot:
     armed: bool | None
     elapsed_s: float
     recorded_s: float
+    armed_until_s: float
     recording_path: Path | None
     recording_bytes: int
     recording: bool

@@ -74,6 +74,7 @@ class Watch:
         self._refit = refit
         self._hurry = hurry
         self._was_armed = False
+        self._armed_until_s = 0.0
         self._wanted = 0
         self._opened = clock.monotonic()
         self._situation = SituationWatch()
@@ -114,6 +115,8 @@ class Watch:
         self._ring.look(now.armed, now.attitude, now.throttle)
         loads = {CURRENT: now.current, THROTTLE: now.throttle}
         self._hover.look(now.armed, loads, self._refit().analysis, seconds)
+        if now.armed:
+            self._armed_until_s = seconds
         self._look_for_landing(now.armed)
 
     def _look_for_landing(self, armed: bool | None) -> None:
@@ -147,6 +150,7 @@ class Watch:
             armed=now.armed,
             elapsed_s=self.elapsed_s,
             recorded_s=self._tap.seconds(vehicle),
+            armed_until_s=self._armed_until_s,
             recording_path=self._tap.path,
             recording_bytes=self._tap.size,
             recording=self._tap.taking and not self._tap.failure,

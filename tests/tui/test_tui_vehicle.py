@@ -112,7 +112,7 @@ async def test_recording_shows_everything_and_says_what_to_do_next(tmp_path):
             "time 01:23",
             "compass 50 Hz",
             "1 % lost",
-            "missing: headings, a steady answer",
+            "missing: headings, a sure answer",
             "at hover at most 1.3° (95 %), falling █▆▅▄▃ at 24 A",
             "◇ next, 200°",
             "recording-20250615T150640Z.tlog",
