@@ -456,9 +456,9 @@ async def test_after_writing_before_is_worked_out_from_the_backup(tmp_path):
         session.change(compasses=(_at(24.0, written=True),))
         await press(pilot, "n")
         await until(pilot, lambda: "worked out from the backup" in screen(pilot.app))
-        pair = pilot.app.screen._pairs[0]
-        assert pair.before == pytest.approx(unwritten, abs=0.2)
-        assert pair.after == pytest.approx(315.0, abs=0.2)
+        shown = pilot.app.screen
+        await until(pilot, lambda: shown._pairs[0].after == pytest.approx(315.0, abs=0.2))
+        assert shown._pairs[0].before == pytest.approx(unwritten, abs=0.2)
 
 
 async def test_after_the_next_flight_the_promise_stands_beside_what_was_measured(tmp_path):
