@@ -114,6 +114,9 @@ class LiveSnapshot:
         What the newest analysis promises at the hover, and those before it.
     situation, guidance
         What is going on, and what to do next.
+    early
+        Too little is recorded, or was when the newest analysis was made, for a verdict against a
+        compass.
     warnings
         Sentences, most important first.
     analysis
@@ -157,6 +160,7 @@ class LiveSnapshot:
     bound: Bound | None
     situation: Situation
     guidance: Guidance
+    early: bool
     warnings: tuple[str, ...]
     analysis: Analysis | None
     grade: Grade | None

@@ -35,7 +35,7 @@ from magcomp.live.guide import (
 )
 from magcomp.live.latest import Now
 from magcomp.live.prepare import Preparation
-from magcomp.live.progress import Enough, HeadingRing, HoverBound, largest_bound
+from magcomp.live.progress import Early, Enough, HeadingRing, HoverBound, largest_bound
 from magcomp.live.refit import Refit
 from magcomp.live.situation import Look, Manoeuvre, SituationWatch
 from magcomp.live.snapshot import LiveSnapshot, compasses_now, slow_streams, warnings
@@ -82,6 +82,7 @@ class Watch:
         self._hurry = hurry
         self._was_armed = False
         self._armed_until_s = 0.0
+        self._early = Early()
         self._wanted = 0
         self._opened = clock.monotonic()
         self._situation = SituationWatch()
@@ -165,6 +166,7 @@ class Watch:
         parameters = {} if vehicle is None else latest.parameters(vehicle)
         link, refit = self._connection.statistics(), self._refit()
         view = self._view(now, vehicle)
+        guidance = self._guidance(vehicle, view)
         return LiveSnapshot(
             address=str(self._connection.address),
             vehicle=vehicle,
@@ -192,7 +194,8 @@ class Watch:
             wanted_heading_deg=_wanted_deg(view),
             bound=self._hover.bound,
             situation=view.situation,
-            guidance=self._guidance(vehicle, view),
+            guidance=guidance,
+            early=self._early.look(guidance, view.seconds, refit.analysis),
             warnings=self._warnings(now, vehicle, parameters),
             analysis=refit.analysis,
             grade=view.grade,

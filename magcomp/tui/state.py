@@ -79,4 +79,4 @@ class State:
     @property
     def early(self) -> bool:
         """Too little is recorded yet for a verdict against a compass."""
-        return self.live is not None and self.live.guidance.early
+        return self.live is not None and self.live.early

@@ -242,6 +242,7 @@ def snapshot(**changes: object) -> LiveSnapshot:
         bound=Bound(24.0, "current", (4.1, 3.0, 2.2, 1.7, 1.3)),
         situation=Situation.FLYING,
         guidance=Guidance("turn slowly to the right", 0.66, missing=("headings", "a sure answer")),
+        early=True,
         warnings=("compass 3 is not used for the heading (COMPASS_USE is 0)",),
         analysis=None,
         grade=Grade.GOOD,

@@ -166,7 +166,7 @@ async def test_a_compass_is_not_rejected_before_enough_is_recorded(tmp_path):
         await press(pilot, "n")
         await until(pilot, lambda: "too early" in screen(pilot.app))
         assert "REJECTED" not in screen(pilot.app)
-        session.change(guidance=Guidance("that is enough", 1.0, enough=True))
+        session.change(early=False)
         await until(pilot, lambda: "REJECTED" in screen(pilot.app))
 
 
@@ -179,7 +179,7 @@ async def test_a_fit_that_is_tried_too_early_is_not_called_rejected(tmp_path):
         await until(pilot, lambda: "Too early for compass 1: The current" in screen(pilot.app))
         assert "[1] … too early" in screen(pilot.app)
         assert "press B, record more" in screen(pilot.app)
-        session.change(guidance=Guidance("that is enough", 1.0, enough=True))
+        session.change(early=False)
         await until(pilot, lambda: "Compass 1 is rejected: The current" in screen(pilot.app))
 
 

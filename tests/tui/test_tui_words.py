@@ -195,11 +195,18 @@ def test_the_throttle_now_is_always_in_the_table_of_levels(now, height):
     assert any(line.startswith(f"▸{10 * now:3d}–") for line in drawn)
 
 
-def test_the_bar_makes_room_for_what_is_missing():
+@pytest.mark.parametrize(
+    ("width", "said"),
+    [
+        (78, "missing: headings, climbs and descents, a sure answer"),
+        (58, "missing: headings, …"),
+    ],
+)
+def test_what_is_missing_is_not_cut_within_a_name(width, said):
     facts = Facts(0.7, ("headings", "climbs and descents", "a sure answer"), "a.tlog", "1 MB", 9, 9)
-    line = LiveFacts().picture(facts, 78, 2).plain.split("\n")[0]
-    assert line.endswith("missing: headings, climbs and descents, a sure answer")
-    assert len(line) <= 78
+    line = LiveFacts().picture(facts, width, 2).plain.split("\n")[0]
+    assert line.endswith(said)
+    assert len(line) <= width
 
 
 def test_a_fit_is_outdated_once_more_was_flown_and_not_by_standing_about():

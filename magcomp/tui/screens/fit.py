@@ -169,13 +169,15 @@ and C change method, regressor, time range and compasses, and fit again at once;
     def _next(self, analysis: Analysis | None) -> str:
         if analysis is None:
             return "Press F to fit what was recorded."
-        if analysis.grade is Grade.REJECTED:
-            if self.state.early:
-                return "Too early for an answer: press B, record more, then press N and F."
-            return "Do what the first line says, record again, and fit again. M: other method."
+        rejected = analysis.grade is Grade.REJECTED
         if self.state.is_outdated:
             more = words.duration(self.state.unfitted_s)
-            return f"{more} came since this fit: press F to fit that too, or N to write this."
+            other = "" if rejected else ", or N to write this"
+            return f"{more} came since this fit: press F to fit that too{other}."
+        if rejected and self.state.early:
+            return "Too early for an answer: press B, record more, then press N."
+        if rejected:
+            return "Do what the first line says, record again, and fit again. M: other method."
         return "Look at the pictures (V), then press N to see what would be written."
 
     def on_resize(self) -> None:

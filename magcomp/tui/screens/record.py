@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import textwrap
+from collections.abc import Iterable, Sequence
 from typing import ClassVar
 
 from textual.binding import Binding, BindingType
@@ -27,6 +28,7 @@ _SAID = {
     Manoeuvre.SWEEP: "Taken as tied down.",
 }
 
+_MIND = "Mind: "
 _FEW = 2
 _MANY = 6
 
@@ -110,13 +112,23 @@ press M to say it, once or more, until the *next* line names it.
 
     def _show_mind(self, live: LiveSnapshot) -> None:
         room = _MANY if self.has_class("-tall") else _FEW
-        mind = Content("\n").join(
-            Content.assemble(("Mind: ", "bold $warning"), words.sentence(text))
-            for text in live.warnings[:room]
-        )
+        mind = mind_text(live.warnings, self.size.width - 2, room)
         if mind.plain != self._mind:
             self._mind = mind.plain
             self.query_one("#mind", Static).update(mind)
+
+
+def mind_text(warnings: Sequence[str], width: int, lines: int) -> Content:
+    """What a pilot should know, in so many lines; what does not fit ends in a sign for that."""
+    told: list[Content] = []
+    for warning in warnings:
+        text = f"{_MIND}{words.sentence(warning)}"
+        wrapped = textwrap.wrap(text, width, max_lines=lines - len(told), placeholder=" …")
+        first, *others = map(Content, wrapped)
+        told += [first.stylize("bold $warning", 0, len(_MIND)), *others]
+        if len(told) >= lines:
+            break
+    return Content("\n").join(told)
 
 
 def _compasses_title(live: LiveSnapshot, room: int) -> str:

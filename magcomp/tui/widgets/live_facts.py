@@ -15,6 +15,7 @@ from magcomp.tui.widgets.drawn import Drawn
 _FIELD_MESSAGES = ("RAW_IMU", "SCALED_IMU", "SCALED_IMU2", "SCALED_IMU3")
 _SPARKS = "▁▂▃▄▅▆▇█"
 _SPARK_CELLS = 12
+_SHORTEST = 4
 _LOOK_BACK = 3
 _TO_FIVES_S, _TO_TENS_S = 20.0, 95.0
 _STEADY = 0.1
@@ -65,9 +66,9 @@ class LiveFacts(Drawn[Facts]):
 
     def picture(self, data: Facts, width: int, height: int) -> Content:  # noqa: ARG002
         """The lines; of a long name the end counts."""
-        missing = f"  missing: {', '.join(data.missing)}" if data.missing else ""
-        said = f" {100 * data.share:3.0f} %{missing}"
-        length = min(max(width // 4, 8), 30, max(width - 9 - len(said), 4))
+        share = f" {100 * data.share:3.0f} %"
+        said = share + _missing(data.missing, width - 9 - _SHORTEST - len(share))
+        length = min(max(width // 4, 8), 30, max(width - 9 - len(said), _SHORTEST))
         first = Content.assemble(
             (" enough  ", "$quiet"), bar(data.share, length, style="$success"), said
         )
@@ -77,6 +78,15 @@ class LiveFacts(Drawn[Facts]):
         file = data.file if len(data.file) <= room else f"…{data.file[1 - room :]}"
         where = f"{file}{rest}" if data.file else f"nothing is written to a file{rest}"
         return Content("\n").join([first, Content.assemble((" file    ", "$quiet"), where)])
+
+
+def _missing(names: tuple[str, ...], room: int) -> str:
+    """What is missing; names that there is no room for are left out whole."""
+    for count in range(len(names), 0, -1):
+        text = f"  missing: {', '.join(names[:count])}{', …' if count < len(names) else ''}"
+        if len(text) <= room or count == 1:
+            return text
+    return ""
 
 
 def bound_words(live: LiveSnapshot, room: int) -> str:
