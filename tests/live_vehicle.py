@@ -8,6 +8,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 from magcomp.simulate import Faults, FaultyLink, Machine, Vehicle, run, scenario
 from magcomp.simulate.transports import open_transport
@@ -43,19 +44,48 @@ class Flown:
 
 
 class Haste:
-    """A clock that runs fast while a vehicle carries out its programme."""
+    """A clock that runs fast while a vehicle flies for somebody, and waits for who reads.
 
-    def __init__(self, vehicle: Vehicle, speed: float) -> None:
-        self._vehicle, self._speed = vehicle, speed
+    It stands while the reader has not taken what was sent: a vehicle in lock-step with its reader
+    loses nothing on a busy machine. One that flies for the ground is no faster than ours until
+    its readings are asked for, so that it does not fly away while it is found.
+    """
+
+    def __init__(self, vehicle: Vehicle, port: int, speed: float, *, for_ground: bool) -> None:
+        self._vehicle, self._speed, self._for_ground = vehicle, speed, for_ground
         self._slower = speed if vehicle.program_over else min(speed, AFTERWARDS)
+        self._reader = Reader(port)
         self._looked, self._now = time.monotonic(), 0.0
 
     def __call__(self) -> float:
         looked = time.monotonic()
-        speed = self._slower if self._vehicle.program_over else self._speed
-        self._now += (looked - self._looked) * speed
+        hurries = self._is_read() and not self._vehicle.program_over
+        if not self._reader.lags():
+            self._now += (looked - self._looked) * (self._speed if hurries else self._slower)
         self._looked = looked
         return self._now
+
+    def _is_read(self) -> bool:
+        talker = self._vehicle.firmware.talker
+        asked_for = any(talker.schedule.interval_us(message) > 0 for message in talker.telemetry)
+        return asked_for or not self._for_ground
+
+
+class Reader:
+    """Who listens at a UDP port of this computer, as far as the system tells."""
+
+    _TABLE = Path("/proc/net/udp")
+
+    def __init__(self, port: int) -> None:
+        self._local = f"0100007F:{port:04X}"
+
+    def lags(self) -> bool:
+        """Whether something waits there to be read; False where the system does not tell."""
+        if not self._TABLE.exists():
+            return False
+        rows = (row.split() for row in self._TABLE.read_text(encoding="ascii").splitlines()[1:])
+        queues = [row[4] for row in rows if row[1] == self._local]
+        return any(int(queue.partition(":")[2], 16) for queue in queues)
 
 
 @contextlib.contextmanager
@@ -71,14 +101,16 @@ def alive(
     **options: object,
 ) -> Iterator[Flown]:
     """Let a vehicle live while the block runs; ``options`` are those of `Vehicle`."""
-    vehicle = vehicle or Vehicle(scenario(program, seed), **{"wait_for_ground": True, **options})
+    options = {"wait_for_ground": True, **options}
+    vehicle = vehicle or Vehicle(scenario(program, seed), **options)
     machine = wrap(vehicle if faults is None else FaultyLink(vehicle, faults))
     port, stop = port or free_port(), threading.Event()
+    haste = Haste(vehicle, port, speed, for_ground=bool(options["wait_for_ground"]))
     with contextlib.closing(open_transport(f"udpout:127.0.0.1:{port}")) as transport:
         thread = threading.Thread(
             target=run,
             args=(machine, transport, stop),
-            kwargs={"clock": Haste(vehicle, speed), "begin": vehicle.time},
+            kwargs={"clock": haste, "begin": vehicle.time},
         )
         thread.start()
         try:

@@ -21,7 +21,6 @@ from magcomp.autopilots.ardupilot_correction import (
     scale_in_force,
     soft_iron_matrix,
     soft_iron_parameters,
-    uncorrect,
     unseen,
     vector_parameters,
 )
@@ -398,7 +397,6 @@ __all__ = [
     "soft_iron_matrix",
     "soft_iron_parameters",
     "suffix",
-    "uncorrect",
     "vector_names",
     "vector_parameters",
 ]

@@ -298,10 +298,3 @@ def correct(raw: ArrayLike, u: ArrayLike, calibration: Calibration) -> FloatArra
     rows = np.asarray(raw, float)
     made = in_force(calibration).correction.apply(rows.reshape(-1, 3), np.ravel(u))
     return made.reshape(rows.shape)
-
-
-def uncorrect(corrected: ArrayLike, u: ArrayLike, calibration: Calibration) -> FloatArray:
-    """Sensor field from a corrected one: the inverse of :func:`correct`."""
-    rows = np.asarray(corrected, float)
-    made = in_force(calibration).correction.undo(rows.reshape(-1, 3), np.ravel(u))
-    return made.reshape(rows.shape)

@@ -298,17 +298,9 @@ def correct(sensor: ArrayLike, power: ArrayLike, calibration: Calibration) -> Fl
     power
         P, shape (...).
     """
-    off = calibration.compensation is Compensation.OFF
-    motor = np.zeros(3) if off else calibration.motor
-    disturbed = np.asarray(sensor, float) + np.multiply.outer(np.asarray(power, float), motor)
-    return np.asarray((disturbed - calibration.offset) @ calibration.soft_iron.T)
-
-
-def uncorrect(corrected: ArrayLike, power: ArrayLike, calibration: Calibration) -> FloatArray:
-    """The sensor's own field from a corrected one: the inverse of :func:`correct`."""
-    off = calibration.compensation is Compensation.OFF
-    motor = np.zeros(3) if off else calibration.motor
-    linear = np.linalg.solve(calibration.soft_iron, np.asarray(corrected, float)[..., None])
-    return np.asarray(
-        linear[..., 0] + calibration.offset - np.multiply.outer(np.asarray(power, float), motor)
+    rows = MGAUSS * np.asarray(sensor, float)
+    unit = 1.0 if calibration.compensation is Compensation.THRUST else MGAUSS
+    made = body_correction(calibration, np.eye(3)).apply(
+        rows.reshape(-1, 3), unit * np.ravel(power)
     )
+    return np.asarray(made.reshape(rows.shape) / MGAUSS)

@@ -189,10 +189,11 @@ def variance_shares(fit: MotorFit, u: float) -> dict[str, float]:
     field = _field_at(fit, roll, pitch, yaw)
     centred = (field - u * fit.correction.vector) @ np.linalg.inv(fit.correction.soft_iron).T
     slopes = _shift_slopes(field, centred, roll, pitch, u, fit)
-    worst = slopes[int(np.argmax(np.einsum("ki,ij,kj->k", slopes, fit.covariance, slopes)))]
+    covariance = fit.shared_covariance
+    worst = slopes[int(np.argmax(np.einsum("ki,ij,kj->k", slopes, covariance, slopes)))]
     groups = {"motor": MOTOR, "offset": OFFSET, "soft iron": SOFT_IRON}
     return {
-        name: float(worst[part] @ fit.covariance[part, part] @ worst[part])
+        name: float(worst[part] @ covariance[part, part] @ worst[part])
         for name, part in groups.items()
     }
 

@@ -1,10 +1,15 @@
-"""Watches a live link: what happens on it, how the vehicle is moved, and what a screen shows."""
+"""Watches a live link: what happens on it, how the vehicle is moved, and what a screen shows.
+
+The vehicle is looked at by its own clock, as its frames arrive: a replay, or a simulation, may be
+faster than ours, and what is found must not depend on how fast it is played.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import math
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 
@@ -30,11 +35,13 @@ from magcomp.live.guide import (
 )
 from magcomp.live.latest import Now
 from magcomp.live.prepare import Preparation
-from magcomp.live.progress import Enough, HeadingRing, HoverBound, largest_bound
+from magcomp.live.progress import Early, Enough, HeadingRing, HoverBound, largest_bound
 from magcomp.live.refit import Refit
 from magcomp.live.situation import Look, Manoeuvre, SituationWatch
 from magcomp.live.snapshot import LiveSnapshot, compasses_now, slow_streams, warnings
 from magcomp.live.tap import Tap
+from magcomp.mavlink.header import message_id, source
+from magcomp.mavlink.messages import Message
 from magcomp.model import CURRENT, THROTTLE, Vehicle
 
 LOOK_S = 0.2
@@ -44,7 +51,7 @@ _NOTHING = Now(0, None, {}, (), None, None, None, None, None, None, False)
 
 
 class Watch:
-    """Looks at a link a few times a second, in the thread that calls ``run``.
+    """Hears of the link in the thread that calls ``run``, and of the vehicle as its tap's listener.
 
     Parameters
     ----------
@@ -74,6 +81,8 @@ class Watch:
         self._refit = refit
         self._hurry = hurry
         self._was_armed = False
+        self._armed_until_s = 0.0
+        self._early = Early()
         self._wanted = 0
         self._opened = clock.monotonic()
         self._situation = SituationWatch()
@@ -83,6 +92,8 @@ class Watch:
         self._notes: list[str] = []
         self._slow = ""
         self._gap = (-math.inf, "")
+        self._looked_s = -math.inf
+        tap.listen(self)
 
     @property
     def manoeuvre(self) -> Manoeuvre | None:
@@ -94,26 +105,42 @@ class Watch:
         self._situation.manoeuvre = said
 
     def run(self, stop: threading.Event) -> None:
-        """Watch until stopped; what goes wrong in one look is told, and the next one follows."""
+        """Hear of the link until stopped."""
         while not stop.wait(LOOK_S):
-            try:
-                self._look()
-            except Exception as error:
-                self._note(unforeseen(error))
+            with self._told():
+                for event in self._connection.take_events():
+                    self._take(event)
 
-    def _look(self) -> None:
-        for event in self._connection.take_events():
-            self._take(event)
-        vehicle = self._connection.vehicle
-        if vehicle is None:
+    def add(self, unix_us: int, frame: bytes) -> None:  # noqa: ARG002 - a FrameSink
+        """Look at the vehicle with its heartbeats, and with attitudes ``LOOK_S`` apart."""
+        message = message_id(frame)
+        if message not in (Message.HEARTBEAT, Message.ATTITUDE):
             return
-        now = self._tap.latest.now(vehicle)
-        # By the vehicle's clock: a replay, or a simulation, may be faster than ours.
+        vehicle = self._connection.vehicle
+        if vehicle is None or source(frame) != (vehicle.system, vehicle.component):
+            return
         seconds = self._tap.seconds(vehicle)
+        if message == Message.HEARTBEAT or seconds >= self._looked_s + LOOK_S:
+            self._looked_s = seconds
+            with self._told():
+                self._look(vehicle, seconds)
+
+    @contextlib.contextmanager
+    def _told(self) -> Iterator[None]:
+        """Tell what goes wrong in one look; the next one follows."""
+        try:
+            yield
+        except Exception as error:
+            self._note(unforeseen(error))
+
+    def _look(self, vehicle: Vehicle, seconds: float) -> None:
+        now = self._tap.latest.now(vehicle)
         self._situation.update(Look(seconds, now.armed, now.attitude, now.height_m, now.accel))
         self._ring.look(now.armed, now.attitude, now.throttle)
         loads = {CURRENT: now.current, THROTTLE: now.throttle}
         self._hover.look(now.armed, loads, self._refit().analysis, seconds)
+        if now.armed:
+            self._armed_until_s = seconds
         self._look_for_landing(now.armed)
 
     def _look_for_landing(self, armed: bool | None) -> None:
@@ -139,6 +166,7 @@ class Watch:
         parameters = {} if vehicle is None else latest.parameters(vehicle)
         link, refit = self._connection.statistics(), self._refit()
         view = self._view(now, vehicle)
+        guidance = self._guidance(vehicle, view)
         return LiveSnapshot(
             address=str(self._connection.address),
             vehicle=vehicle,
@@ -147,6 +175,7 @@ class Watch:
             armed=now.armed,
             elapsed_s=self.elapsed_s,
             recorded_s=self._tap.seconds(vehicle),
+            armed_until_s=self._armed_until_s,
             recording_path=self._tap.path,
             recording_bytes=self._tap.size,
             recording=self._tap.taking and not self._tap.failure,
@@ -165,7 +194,8 @@ class Watch:
             wanted_heading_deg=_wanted_deg(view),
             bound=self._hover.bound,
             situation=view.situation,
-            guidance=self._guidance(vehicle, view),
+            guidance=guidance,
+            early=self._early.look(guidance, view.seconds, refit.analysis),
             warnings=self._warnings(now, vehicle, parameters),
             analysis=refit.analysis,
             grade=view.grade,

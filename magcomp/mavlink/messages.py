@@ -1,18 +1,19 @@
 """The messages magcomp needs: their numbers, their layouts, and frames decoded into columns.
 
-The layouts come from pymavlink's message map, so this file holds no field offsets of its own.
-Only the map is used: pymavlink's own decoder works message by message.
+The layouts stand in dialect.txt, which ``tests/mavlink/write_dialect.py`` writes from pymavlink's
+message map. pymavlink itself, with a class for every message, takes longer to import than a log
+takes to read, and 100 MB.
 """
 
 from __future__ import annotations
 
 from enum import IntEnum
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pymavlink.dialects.v20.ardupilotmega import mavlink_map
 
 from magcomp.mavlink.checksum import ByteArray, OffsetArray
 from magcomp.mavlink.frames import Frames
@@ -49,34 +50,37 @@ WANTED = frozenset(int(message) for message in Message)
 
 
 @cache
+def _dialect() -> dict[int, tuple[int, str]]:
+    """CRC_EXTRA and fields, as dialect.txt has them, by message id."""
+    lines = Path(__file__).with_name("dialect.txt").read_text(encoding="ascii").splitlines()
+    parts = (line.split(" ", 2) for line in lines)
+    return {int(number): (int(extra), fields) for number, extra, fields in parts}
+
+
+@cache
 def crc_extra() -> NDArray[np.int16]:
     """CRC_EXTRA by message id, −1 where the id is unknown, shape (65536,)."""
     table = np.full(_LARGEST_KNOWN_ID + 1, -1, dtype=np.int16)
-    for number, message in mavlink_map.items():
-        if number <= _LARGEST_KNOWN_ID:
-            table[number] = message.crc_extra
+    for number, (extra, _) in _dialect().items():
+        table[number] = extra
     table.setflags(write=False)
     return table
 
 
 @cache
 def layout(message: int) -> np.dtype[Any]:
-    """Fields of a message in the order of the wire, extensions included."""
-    known = mavlink_map[message]
-    codes = bytes(known.native_format).decode("ascii").lstrip("<")
+    """Fields of a message in the order of the wire, extensions included.
+
+    Examples
+    --------
+    >>> layout(Message.ATTITUDE).names
+    ('time_boot_ms', 'roll', 'pitch', 'yaw', 'rollspeed', 'pitchspeed', 'yawspeed')
+    """
     columns: list[tuple[str, str] | tuple[str, str, int]] = []
-    for name, code, count in zip(known.ordered_fieldnames, codes, known.array_lengths, strict=True):
-        if code == "c":
-            columns.append((name, f"S{count}"))
-        elif count:
-            columns.append((name, _FORMATS[code], count))
-        else:
-            columns.append((name, _FORMATS[code]))
+    for field in _dialect()[message][1].split():
+        name, kind, *count = field.split(":")
+        columns.append((name, f"<{kind}", int(count[0])) if count else (name, f"<{kind}"))
     return np.dtype(columns)
-
-
-_FORMATS = {code: f"<{code}" for code in "bBhHiIfd"} | {"q": "<i8", "Q": "<u8"}
-# numpy's "i" and "I" are four bytes on every platform that numpy knows, as are MAVLink's.
 
 
 def decode(data: ByteArray, frames: Frames, message: int) -> Table:

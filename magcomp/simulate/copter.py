@@ -8,63 +8,36 @@ from typing import Any
 import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from magcomp.earth import EarthField
 from magcomp.simulate import physics, telemetry
 from magcomp.simulate.ahrs import Ahrs
 from magcomp.simulate.autopilot import Autopilot
 from magcomp.simulate.correction import Correction
-from magcomp.simulate.habits import Habits
+from magcomp.simulate.firmware import Board
 from magcomp.simulate.moment import Moment
 from magcomp.simulate.motion import FloatArray
 from magcomp.simulate.outputs import motor_outputs, motor_thrust
 from magcomp.simulate.parameters import ParameterStore, initial_values
 from magcomp.simulate.talker import Talker
-from magcomp.simulate.truth import Truth
 
 _HEARTBEAT_MS = 1000
 _TIMESYNC_MS = 10_000
 
 
 class Copter:
-    """See :class:`magcomp.simulate.firmware.Firmware`.
+    """See :class:`magcomp.simulate.firmware.Firmware`."""
 
-    Parameters
-    ----------
-    truth
-        The vehicle.
-    parameters
-        What differs from the parameters the truth gives it.
-    field
-        The earth's field where it lives.
-    rng
-        Of its attitude's errors.
-    system
-        MAVLink system number.
-    habits
-        What it is and does besides.
-    answers_errors
-        Send PARAM_ERROR where 4.6 is silent, as newer firmware does.
-    """
-
-    def __init__(
-        self,
-        truth: Truth,
-        parameters: Mapping[str, float],
-        field: EarthField,
-        rng: np.random.Generator,
-        *,
-        system: int,
-        habits: Habits,
-        answers_errors: bool,
-    ) -> None:
+    def __init__(self, board: Board) -> None:
+        truth, habits = board.truth, board.habits
         self._truth = truth
-        self._declination = field.declination
-        self._rng = rng
+        self._declination = board.field.declination
+        self._rng = board.rng
         self._store = ParameterStore(
-            {**initial_values(truth), **parameters}, storage_s=habits.storage_s, seed=truth.seed
+            {**initial_values(truth), **board.parameters},
+            storage_s=habits.storage_s,
+            seed=truth.seed,
         )
         self._autopilot = Autopilot(
-            self._store, system, answers_errors=answers_errors, habits=habits
+            self._store, board.system, answers_errors=board.answers_errors, habits=habits
         )
         self._correction = Correction(self._store)
         self._ahrs = Ahrs(tilt=np.zeros(2))

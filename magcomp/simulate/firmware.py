@@ -3,10 +3,47 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any, Protocol
 
+import numpy as np
+
+from magcomp.earth import EarthField
+from magcomp.simulate.habits import Habits
 from magcomp.simulate.moment import FloatArray, Moment
 from magcomp.simulate.talker import Talker
+from magcomp.simulate.truth import Truth
+
+
+@dataclass(frozen=True, eq=False)
+class Board:
+    """What an autopilot is put into.
+
+    Attributes
+    ----------
+    truth
+        The vehicle.
+    parameters
+        What differs from the parameters the truth gives it.
+    field
+        The earth's field where it lives.
+    rng
+        Of its sensors' noise and its attitude's errors.
+    system
+        MAVLink system number.
+    habits
+        What it is and does besides.
+    answers_errors
+        Send PARAM_ERROR where the firmware is silent, as newer firmware does.
+    """
+
+    truth: Truth
+    parameters: Mapping[str, float]
+    field: EarthField
+    rng: np.random.Generator
+    system: int
+    habits: Habits
+    answers_errors: bool
 
 
 class Firmware(Protocol):

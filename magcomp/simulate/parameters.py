@@ -12,11 +12,11 @@ import csv
 from collections.abc import Mapping
 from enum import IntEnum
 from importlib import resources
-from types import MappingProxyType
 
 import numpy as np
 
 from magcomp.autopilots import ardupilot
+from magcomp.simulate.held import Held
 from magcomp.simulate.truth import Truth
 
 DEVICE_IDS = (97539, 131874, 263178)
@@ -46,7 +46,7 @@ _LIMITS = {
 }
 
 
-class ParameterStore:
+class ParameterStore(Held):
     """What is in force, and what a reboot brings back.
 
     Parameters
@@ -62,13 +62,11 @@ class ParameterStore:
     def __init__(
         self, values: Mapping[str, float], *, storage_s: float = 0.0, seed: int = 0
     ) -> None:
+        super().__init__()
         self._storage_s = storage_s
         self._rng = np.random.default_rng([seed, 6])
         self._stored: dict[str, float] = {}
         self._pending: list[tuple[float, str]] = []
-        self._types: dict[str, ParameterType] = {}
-        self._values: dict[str, float] = {}
-        self.version = 0
         for name, kind, value in _defaults():
             self._types[name] = kind
             self._values[name] = value
@@ -80,27 +78,12 @@ class ParameterStore:
             self.put(name, value)
         self._stored = dict(self._values)
 
-    def __getitem__(self, name: str) -> float:
-        return self._values[name]
-
-    def __contains__(self, name: object) -> bool:
-        return name in self._values
-
-    @property
-    def values(self) -> Mapping[str, float]:
-        """Every value, hidden ones too."""
-        return MappingProxyType(self._values)
-
     @property
     def listed(self) -> tuple[str, ...]:
         """The names a ground station is shown, in the order of their indices."""
         if self._values[_PER_MOTOR_SWITCH]:
             return tuple(self._values)
         return tuple(name for name in self._values if name not in _PER_MOTOR)
-
-    def type_of(self, name: str) -> ParameterType:
-        """How the autopilot stores it."""
-        return self._types[name]
 
     def write(self, name: str, value: float, now_s: float) -> None:
         """Take a value into force at once, and into the memory that survives some time later."""
@@ -125,7 +108,7 @@ class ParameterStore:
 
     def put(self, name: str, value: float) -> None:
         """Hold and store a value as the autopilot's type can hold it."""
-        kind = self._types[name]
+        kind = ParameterType(self._types[name])
         if kind is ParameterType.REAL32:
             stored = float(np.float32(value))
         else:

@@ -50,6 +50,29 @@ def servo_output_raw(view: Known, outputs: Sequence[int]) -> Any:
     )
 
 
+def vfr_hud(view: Known, *, airspeed: float | None, throttle: float) -> Any:
+    """VFR_HUD; the airspeed is the ground speed where it is not given, the throttle 0 … 1."""
+    north, east, down = view.velocity.tolist()
+    ground_speed = float(np.hypot(north, east))
+    return mavlink.MAVLink_vfr_hud_message(
+        airspeed=ground_speed if airspeed is None else airspeed,
+        groundspeed=ground_speed,
+        heading=int(np.degrees(view.attitude[2]) % 360.0),
+        throttle=int(throttle * 100.0),
+        alt=view.geodetic()[2],
+        climb=-down,
+    )
+
+
+def sys_status(
+    sensors: tuple[int, int, int], load: int, voltage: float, centiamperes: int, percent: int
+) -> Any:
+    """SYS_STATUS: bits of the sensors present, enabled and healthy; load in permille, V, 10 mA."""
+    return mavlink.MAVLink_sys_status_message(
+        *sensors, load, round(voltage * 1e3), centiamperes, percent, *[0] * 6
+    )
+
+
 def _attitude(view: Known) -> Any:
     rates = view.block.gyro[0, view.step].tolist()
     return mavlink.MAVLink_attitude_message(view.boot_ms, *view.attitude.tolist(), *rates)

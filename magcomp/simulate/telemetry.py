@@ -18,14 +18,16 @@ from magcomp.simulate.shared_telemetry import (
     cut,
     imu_fields,
     servo_output_raw,
+    sys_status,
+    vfr_hud,
 )
 from magcomp.simulate.truth import MOTORS
 
 FloatArray = NDArray[np.float64]
 
 _IMU_TEMPERATURE = 3500
-_SENSORS = 1_399_979_055
-_SENSORS_ENABLED = 1_130_470_447
+_SENSORS = (1_399_979_055, 1_130_470_447, 1_399_979_055)
+_LOAD = 200
 _EKF_FLAGS = 831
 
 
@@ -116,16 +118,7 @@ def _simstate(view: View) -> Any:
 
 
 def _vfr_hud(view: View) -> Any:
-    north, east, down = view.velocity.tolist()
-    ground_speed = float(np.hypot(north, east))
-    return mavlink.MAVLink_vfr_hud_message(
-        airspeed=ground_speed,
-        groundspeed=ground_speed,
-        heading=int(np.degrees(view.attitude[2]) % 360.0),
-        throttle=int(view.demand * 100.0),
-        alt=view.geodetic()[2],
-        climb=-down,
-    )
+    return vfr_hud(view, airspeed=None, throttle=view.demand)
 
 
 def _battery_status(view: View) -> Any | None:
@@ -150,21 +143,10 @@ def _battery_status(view: View) -> Any | None:
 
 def _sys_status(view: View) -> Any:
     battery = view.battery
-    return mavlink.MAVLink_sys_status_message(
-        onboard_control_sensors_present=_SENSORS,
-        onboard_control_sensors_enabled=_SENSORS_ENABLED,
-        onboard_control_sensors_health=_SENSORS,
-        load=200,
-        voltage_battery=0 if battery is None else round(battery.voltage * 1e3),
-        current_battery=-1 if battery is None else _centiamperes(battery),
-        battery_remaining=-1 if battery is None else int(battery.left * 100.0),
-        drop_rate_comm=0,
-        errors_comm=0,
-        errors_count1=0,
-        errors_count2=0,
-        errors_count3=0,
-        errors_count4=0,
-    )
+    if battery is None:
+        return sys_status(_SENSORS, _LOAD, 0.0, -1, -1)
+    percent = int(battery.left * 100.0)
+    return sys_status(_SENSORS, _LOAD, battery.voltage, _centiamperes(battery), percent)
 
 
 def _ekf_status_report(view: View) -> Any:  # noqa: ARG001

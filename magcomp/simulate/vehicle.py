@@ -20,7 +20,7 @@ from magcomp import earth
 from magcomp.errors import UsageError
 from magcomp.simulate import physics
 from magcomp.simulate.copter import Copter
-from magcomp.simulate.firmware import Firmware
+from magcomp.simulate.firmware import Board, Firmware
 from magcomp.simulate.habits import Habits, own_number
 from magcomp.simulate.moment import Moment
 from magcomp.simulate.pilot import Pilot
@@ -110,13 +110,15 @@ class Vehicle:
         self._rng = np.random.default_rng([truth.seed, 3])
         self._field = earth.expected_field(*truth.home, start_unix_s)
         self._firmware: Firmware = AUTOPILOTS[autopilot](
-            truth,
-            parameters or {},
-            self._field,
-            self._rng,
-            system=system,
-            habits=habits,
-            answers_errors=answers_errors,
+            Board(
+                truth,
+                parameters or {},
+                self._field,
+                self._rng,
+                system=system,
+                habits=habits,
+                answers_errors=answers_errors,
+            )
         )
         self._talker = self._firmware.talker
         self._signing_key = signing_key

@@ -39,14 +39,16 @@ def test_undoing_a_correction_gives_back_what_the_sensor_said(values, raw, u):
     calibration = ardupilot.calibration(values, 1)
     amperes = np.full(len(raw), u)
     corrected = ardupilot.correct(raw, amperes, calibration)
-    assert np.allclose(ardupilot.uncorrect(corrected, amperes, calibration), raw, atol=1e-6)
+    assert np.allclose(
+        ardupilot.in_force(calibration).correction.undo(corrected, amperes), raw, atol=1e-6
+    )
 
 
 @given(parameters(), fields, st.floats(0.0, 200.0))
 def test_correcting_what_was_undone_gives_back_what_was_reported(values, corrected, u):
     calibration = ardupilot.calibration(values, 1)
     amperes = np.full(len(corrected), u)
-    raw = ardupilot.uncorrect(corrected, amperes, calibration)
+    raw = ardupilot.in_force(calibration).correction.undo(corrected, amperes)
     assert np.allclose(ardupilot.correct(raw, amperes, calibration), corrected, atol=1e-6)
 
 

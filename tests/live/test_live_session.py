@@ -148,7 +148,7 @@ class TestAFlight:
 
 def test_a_log_is_replayed_as_if_it_were_live():
     log = FIXTURES / "flight_low_rate.tlog"
-    with LiveSession.open(f"{log},500x", refit_share=0.0) as session:
+    with LiveSession.open(f"{log},5000x", refit_share=0.0) as session:
         shown = until(lambda shown: shown.ended, session)
         assert shown.situation is Situation.FLYING
         live, logged = session.recording(), read_tlog(log)

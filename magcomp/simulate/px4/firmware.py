@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from magcomp.autopilots.px4_correction import Compensation
-from magcomp.earth import EarthField
 from magcomp.simulate import physics
 from magcomp.simulate.ahrs import Ahrs
-from magcomp.simulate.habits import Habits
+from magcomp.simulate.firmware import Board
 from magcomp.simulate.moment import Moment
 from magcomp.simulate.px4.autopilot import Px4Talker
 from magcomp.simulate.px4.compasses import Compasses
@@ -21,7 +20,6 @@ from magcomp.simulate.px4.parameters import Parameters, initial_values
 from magcomp.simulate.px4.sensors import as_json
 from magcomp.simulate.px4.telemetry import Battery, View, build
 from magcomp.simulate.talker import Talker
-from magcomp.simulate.truth import Truth
 
 FloatArray = NDArray[np.float64]
 
@@ -33,44 +31,17 @@ _FILTER_S = 0.5
 
 
 class Px4:
-    """See :class:`magcomp.simulate.firmware.Firmware`.
+    """See :class:`magcomp.simulate.firmware.Firmware`."""
 
-    Parameters
-    ----------
-    truth
-        The vehicle.
-    parameters
-        What differs from the parameters the truth gives it.
-    field
-        The earth's field where it lives.
-    rng
-        Of its sensors' noise and its attitude's errors.
-    system
-        MAVLink system number.
-    habits
-        What it is and does besides.
-    answers_errors
-        Send PARAM_ERROR where 1.15 is silent, as newer firmware does.
-    """
-
-    def __init__(
-        self,
-        truth: Truth,
-        parameters: Mapping[str, float],
-        field: EarthField,
-        rng: np.random.Generator,
-        *,
-        system: int,
-        habits: Habits,
-        answers_errors: bool,
-    ) -> None:
-        self._truth, self._field = truth, field
-        self._rng = rng
-        self._parameters = Parameters({**initial_values(truth), **parameters})
+    def __init__(self, board: Board) -> None:
+        truth = board.truth
+        self._truth, self._field = truth, board.field
+        self._rng = board.rng
+        self._parameters = Parameters({**initial_values(truth), **board.parameters})
         self._talker = Px4Talker(
-            self._parameters, system, answers_errors=answers_errors, habits=habits
+            self._parameters, board.system, answers_errors=board.answers_errors, habits=board.habits
         )
-        self._compasses = Compasses(truth, field.ned, self._parameters, rng)
+        self._compasses = Compasses(truth, board.field.ned, self._parameters, board.rng)
         self._ahrs = Ahrs(tilt=np.zeros(2))
         self._battery = Battery(0.0, 0.0, truth.power.full_v, 1.0)
         self._capacity_ah = truth.power.capacity_ah

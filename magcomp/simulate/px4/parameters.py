@@ -11,12 +11,12 @@ import csv
 import zlib
 from collections.abc import Mapping
 from importlib import resources
-from types import MappingProxyType
 
 import numpy as np
 
 from magcomp.autopilots.px4_names import SLOTS, VECTORS, angle_names, single_name, vector_names
 from magcomp.mavlink.parameters import REAL32, Encoding, encode_value
+from magcomp.simulate.held import Held
 from magcomp.simulate.px4.sensors import DEVICE_IDS, EXTERNAL_ROTATION, started
 from magcomp.simulate.truth import Truth
 
@@ -32,7 +32,7 @@ _COUNTERS = ("COM_FLIGHT_UUID", "LND_FLIGHT_T_HI", "LND_FLIGHT_T_LO")
 _INTERNAL = -1.0
 
 
-class Parameters:
+class Parameters(Held):
     """What is held, what was noticed, and what a reboot brings back.
 
     Parameters
@@ -47,12 +47,10 @@ class Parameters:
     """
 
     def __init__(self, values: Mapping[str, float]) -> None:
-        self._types: dict[str, int] = {}
-        self._values: dict[str, float] = {}
+        super().__init__()
         self._unsaved: dict[str, None] = {}
         self._saves_at: float | None = None
         self._saved_at = -np.inf
-        self.version = 0
         for name, kind, value in _defaults():
             self._types[name], self._values[name] = kind, value
         for name, kind, value in _slots():
@@ -63,17 +61,6 @@ class Parameters:
             if name in self._types:
                 self._values[name] = self._held(name, value)
         self._stored = dict(self._values)
-
-    def __getitem__(self, name: str) -> float:
-        return self._values[name]
-
-    def __contains__(self, name: object) -> bool:
-        return name in self._values
-
-    @property
-    def values(self) -> Mapping[str, float]:
-        """Every value, hidden ones too."""
-        return MappingProxyType(self._values)
 
     @property
     def shown(self) -> tuple[str, ...]:
@@ -91,10 +78,6 @@ class Parameters:
     def unsaved(self) -> tuple[str, ...]:
         """Names that were set since everything was saved last."""
         return tuple(self._unsaved)
-
-    def type_of(self, name: str) -> int:
-        """MAV_PARAM_TYPE."""
-        return self._types[name]
 
     def hash(self) -> int:
         """_HASH_CHECK: of what is shown, without the compasses' own calibration."""

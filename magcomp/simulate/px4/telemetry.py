@@ -24,6 +24,8 @@ from magcomp.simulate.shared_telemetry import (
     cut,
     imu_fields,
     servo_output_raw,
+    sys_status,
+    vfr_hud,
 )
 from magcomp.simulate.truth import MOTORS
 
@@ -32,9 +34,8 @@ FloatArray = NDArray[np.float64]
 _MGAUSS = 1000.0
 _OUTPUTS = 16
 _DISARMED_US, _LOW_US, _SPAN_US = 900, 1000.0, 1000.0
-_SENSORS = 35684397
-_SENSORS_ENABLED = 35749933
-_SENSORS_HEALTHY = 840990783
+_SENSORS = (35684397, 35749933, 840990783)
+_LOAD = 300
 _ESTIMATOR_FLAGS = 895
 _TEMPERATURE = 2500
 _EVERYTHING_NEW, _IMU_NEW = 7167, 63
@@ -200,15 +201,7 @@ def _actuator_output_status(view: View) -> Any:
 
 
 def _vfr_hud(view: View) -> Any:
-    north, east, down = view.velocity.tolist()
-    return mavlink.MAVLink_vfr_hud_message(
-        airspeed=0.0,
-        groundspeed=float(np.hypot(north, east)),
-        heading=int(np.degrees(view.attitude[2]) % 360.0),
-        throttle=int(view.thrust * 100.0),
-        alt=view.geodetic()[2],
-        climb=-down,
-    )
+    return vfr_hud(view, airspeed=0.0, throttle=view.thrust)
 
 
 def _battery_status(view: View) -> Any:
@@ -231,21 +224,8 @@ def _battery_status(view: View) -> Any:
 
 def _sys_status(view: View) -> Any:
     battery = view.battery
-    return mavlink.MAVLink_sys_status_message(
-        onboard_control_sensors_present=_SENSORS,
-        onboard_control_sensors_enabled=_SENSORS_ENABLED,
-        onboard_control_sensors_health=_SENSORS_HEALTHY,
-        load=300,
-        voltage_battery=round(battery.voltage * 1e3),
-        current_battery=_centiamperes(battery),
-        battery_remaining=round(battery.left * 100.0),
-        drop_rate_comm=0,
-        errors_comm=0,
-        errors_count1=0,
-        errors_count2=0,
-        errors_count3=0,
-        errors_count4=0,
-    )
+    percent = round(battery.left * 100.0)
+    return sys_status(_SENSORS, _LOAD, battery.voltage, _centiamperes(battery), percent)
 
 
 def _centiamperes(battery: Battery) -> int:
