@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 import tempfile
@@ -35,6 +36,17 @@ def pytest_configure(config: pytest.Config) -> None:
         folder = tempfile.TemporaryDirectory(prefix="magcomp-tests-")
         config.add_cleanup(folder.cleanup)
         os.environ["MAGCOMP_TESTS_ONCE"] = folder.name
+
+
+def pytest_sessionstart() -> None:
+    """Let nothing be looked through while the tests are found: none of it is garbage."""
+    gc.disable()
+
+
+def pytest_collection_finish() -> None:
+    """Look for garbage again, but not among thousands of tests, which live to the end."""
+    gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture
