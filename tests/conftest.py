@@ -15,6 +15,9 @@ from hypothesis import settings
 # loaded; programs that tests start inherit it.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+# An app is drawn when it has something new to show; sixty times a second is for eyes.
+os.environ.setdefault("TEXTUAL_FPS", "12")
+
 # What is printed has Unicode in it, whatever the locale of the machine that tests.
 os.environ["LC_ALL"] = "C.UTF-8"
 
