@@ -52,7 +52,7 @@ def test_the_shares_of_the_motor_vector_grow_with_the_square_of_the_load(flown):
 
 
 def test_a_fit_motor_by_motor_is_put_down_to_what_its_total_leaves(flown):
-    """Four vectors, each as uncertain as the mean of them is certain to half of that."""
+    """The mean of four vectors that are uncertain each for itself is half as uncertain."""
     found = unsure_of(flown[0], MOTOR)
     motor = np.tile(found.correction.vector[:, None], 4)
     variances = np.concatenate([np.diag(found.covariance), np.full(9, 10.0**2)])
