@@ -5,13 +5,12 @@ Nothing here imports numpy: a process decides how many threads it may use before
 
 from __future__ import annotations
 
-import os
 import signal
 import sys
 import traceback
 from multiprocessing.connection import Connection
 
-_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+from magcomp.process import prepare
 
 
 def serve(pipe: Connection, memory: int) -> None:
@@ -26,8 +25,7 @@ def serve(pipe: Connection, memory: int) -> None:
     """
     # Ctrl-C reaches every process of a terminal; the one that started this one ends it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    for name in _THREADS:
-        os.environ.setdefault(name, "1")
+    prepare()
     _limit(memory)
     try:
         work = pipe.recv()

@@ -36,7 +36,8 @@ _THROTTLE_SHARE_S = 2.0
 _HELD_LEVELS = (0, 2, 4, 3, 1, 5)
 _LOW_M = 8.0
 _STABLE_REFITS = 2
-STEADY = "a steady answer"
+_ALMOST = 0.9
+STEADY = "a sure answer"
 FINE_DEG = 0.5
 LONG_S = 240.0
 """A bound that is worth waiting for, and how long."""
@@ -200,10 +201,10 @@ def _guide_unsure(view: View) -> Guidance:
     shares = {
         "headings": min(len(_sectors(view)) / SECTORS_ENOUGH, 1.0),
         "time": min(view.seconds / FLIGHT_S, 1.0),
-        STEADY: _steadiness(view) if view.grade is Grade.GOOD else 0.0,
+        STEADY: _sureness(view) if view.grade is Grade.GOOD else 0.0,
     }
     missing = _missing(shares)
-    if not missing and is_settled(view):
+    if not missing:
         return Guidance(_ending(view), 1.0, enough=True)
     share = 0.9 * float(np.mean(list(shares.values())))
     return Guidance(f"keep the throttle as it is and {_turn(view)}", share, missing=missing)
@@ -219,13 +220,13 @@ def _guide_flight(view: View) -> Guidance:
         "headings": min(len(sectors) / SECTORS_ENOUGH, 1.0),
         "climbs and descents": min(throttles / THROTTLES_ENOUGH, 1.0),
         "time": min(view.seconds / FLIGHT_S, 1.0),
-        STEADY: _steadiness(view) if view.grade is Grade.GOOD else 0.0,
+        STEADY: _sureness(view) if view.grade is Grade.GOOD else 0.0,
     }
     turns, climbs, *_ = shares.values()
     share = float(np.mean(list(shares.values())))
     missing = _missing(shares)
     landed = view.armed is False and view.answered and view.grade is Grade.GOOD
-    if landed or (not missing and is_settled(view)):
+    if landed or not missing:
         return Guidance(_ending(view), 1.0, enough=True)
     if not view.armed and not view.answered:
         text = "wait for the answer: the whole flight is being fitted"
@@ -242,8 +243,11 @@ def _guide_flight(view: View) -> Guidance:
     return Guidance(text, share, missing=missing)
 
 
-def _steadiness(view: View) -> float:
-    return min(view.stable_refits / _STABLE_REFITS, 1.0)
+def _sureness(view: View, *, settled: bool | None = None) -> float:
+    """How near the answer is to one that more data would not change; 1 only where it is one."""
+    if is_settled(view) if settled is None else settled:
+        return 1.0
+    return _ALMOST * min(view.stable_refits / _STABLE_REFITS, 1.0)
 
 
 def _missing(shares: Mapping[str, float]) -> tuple[str, ...]:
@@ -268,11 +272,11 @@ def _guide_held(view: View) -> Guidance:
     best = np.sort(np.minimum(fraction / LEVEL_ENOUGH, 1.0))[::-1][:LEVELS_ENOUGH]
     shares = {
         "turns at three throttles": float(best.sum()) / LEVELS_ENOUGH,
-        STEADY: _steadiness(view) if len(done) >= LEVELS_ENOUGH else 0.0,
+        STEADY: _sureness(view) if len(done) >= LEVELS_ENOUGH else 0.0,
     }
     turns, steadiness = shares.values()
     share, missing = 0.9 * turns + 0.1 * steadiness, _missing(shares)
-    if len(done) >= LEVELS_ENOUGH and is_settled(view):
+    if not missing:
         return Guidance(_ending(view), 1.0, enough=True)
     level = _level(view)
     wanted = next((each for each in _HELD_LEVELS if each not in done), LEVELS // 2 + 1)
@@ -308,15 +312,16 @@ def _throttle_to(wanted: int, level: int) -> str:
 def _guide_still(view: View) -> Guidance:
     seconds = level_seconds(view)
     done = [level for level, time in enumerate(seconds) if time >= STEP_S]
+    # Who stands still cannot show more than the motors' part: marginal is the best there is.
+    steady = view.grade is Grade.MARGINAL and view.stable_refits >= _STABLE_REFITS
+    sureness = _sureness(view, settled=steady or is_settled(view))
     shares = {
         f"{STEPS_ENOUGH} steps of the throttle": min(len(done) / STEPS_ENOUGH, 1.0),
-        STEADY: _steadiness(view) if len(done) >= STEPS_ENOUGH else 0.0,
+        STEADY: sureness if len(done) >= STEPS_ENOUGH else 0.0,
     }
     steps, steadiness = shares.values()
     share, missing = 0.9 * steps + 0.1 * steadiness, _missing(shares)
-    # Who stands still cannot show more than the motors' part: marginal is the best there is.
-    settled = is_settled(view) or view.grade is Grade.MARGINAL
-    if not missing and settled:
+    if not missing:
         return Guidance(_ending(view), 1.0, enough=True)
     level = _level(view)
     wanted = next((each for each in range(STEPS_ENOUGH) if each not in done), None)

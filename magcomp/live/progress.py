@@ -193,3 +193,26 @@ class Enough:
         if guidance.enough:
             self._over.add(situation)
         return replace(guidance, share_done=share)
+
+
+class Early:
+    """Tells a verdict on too little from one that counts."""
+
+    def __init__(self) -> None:
+        self._until_s = 0.0
+
+    def look(self, guidance: Guidance, seconds: float, analysis: Analysis | None) -> bool:
+        """Whether a verdict against a compass is too early.
+
+        Parameters
+        ----------
+        guidance
+            As it is now.
+        seconds
+            Recorded by now.
+        analysis
+            The newest; it may have been made when there was too little.
+        """
+        if guidance.early:
+            self._until_s = seconds
+        return guidance.early or (analysis is not None and analysis.duration_s < self._until_s)

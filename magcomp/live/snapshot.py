@@ -81,6 +81,8 @@ class LiveSnapshot:
     recorded_s
         Seconds of the vehicle's own clock in which attitudes came: it stands while the link is
         lost.
+    armed_until_s
+        The second of these at which the motors ran last; 0 where they never did.
     recording_path, recording_bytes
         The .tlog being written; None and 0 without one.
     recording
@@ -112,6 +114,9 @@ class LiveSnapshot:
         What the newest analysis promises at the hover, and those before it.
     situation, guidance
         What is going on, and what to do next.
+    early
+        Too little is recorded, or was when the newest analysis was made, for a verdict against a
+        compass.
     warnings
         Sentences, most important first.
     analysis
@@ -135,6 +140,7 @@ class LiveSnapshot:
     armed: bool | None
     elapsed_s: float
     recorded_s: float
+    armed_until_s: float
     recording_path: Path | None
     recording_bytes: int
     recording: bool
@@ -154,6 +160,7 @@ class LiveSnapshot:
     bound: Bound | None
     situation: Situation
     guidance: Guidance
+    early: bool
     warnings: tuple[str, ...]
     analysis: Analysis | None
     grade: Grade | None

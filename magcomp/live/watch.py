@@ -35,7 +35,7 @@ from magcomp.live.guide import (
 )
 from magcomp.live.latest import Now
 from magcomp.live.prepare import Preparation
-from magcomp.live.progress import Enough, HeadingRing, HoverBound, largest_bound
+from magcomp.live.progress import Early, Enough, HeadingRing, HoverBound, largest_bound
 from magcomp.live.refit import Refit
 from magcomp.live.situation import Look, Manoeuvre, SituationWatch
 from magcomp.live.snapshot import LiveSnapshot, compasses_now, slow_streams, warnings
@@ -81,6 +81,8 @@ class Watch:
         self._refit = refit
         self._hurry = hurry
         self._was_armed = False
+        self._armed_until_s = 0.0
+        self._early = Early()
         self._wanted = 0
         self._opened = clock.monotonic()
         self._situation = SituationWatch()
@@ -137,6 +139,8 @@ class Watch:
         self._ring.look(now.armed, now.attitude, now.throttle)
         loads = {CURRENT: now.current, THROTTLE: now.throttle}
         self._hover.look(now.armed, loads, self._refit().analysis, seconds)
+        if now.armed:
+            self._armed_until_s = seconds
         self._look_for_landing(now.armed)
 
     def _look_for_landing(self, armed: bool | None) -> None:
@@ -162,6 +166,7 @@ class Watch:
         parameters = {} if vehicle is None else latest.parameters(vehicle)
         link, refit = self._connection.statistics(), self._refit()
         view = self._view(now, vehicle)
+        guidance = self._guidance(vehicle, view)
         return LiveSnapshot(
             address=str(self._connection.address),
             vehicle=vehicle,
@@ -170,6 +175,7 @@ class Watch:
             armed=now.armed,
             elapsed_s=self.elapsed_s,
             recorded_s=self._tap.seconds(vehicle),
+            armed_until_s=self._armed_until_s,
             recording_path=self._tap.path,
             recording_bytes=self._tap.size,
             recording=self._tap.taking and not self._tap.failure,
@@ -188,7 +194,8 @@ class Watch:
             wanted_heading_deg=_wanted_deg(view),
             bound=self._hover.bound,
             situation=view.situation,
-            guidance=self._guidance(vehicle, view),
+            guidance=guidance,
+            early=self._early.look(guidance, view.seconds, refit.analysis),
             warnings=self._warnings(now, vehicle, parameters),
             analysis=refit.analysis,
             grade=view.grade,

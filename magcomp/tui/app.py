@@ -112,6 +112,7 @@ class MagcompApp(BaseApp):
             opening.watch_vehicle(self)
             verifying.watch_flight(self)
             self.redraw()
+        self.tell_drawn()
 
     def on_sweep_told(self, message: SweepTold) -> None:
         """Show how a sweep goes on."""
@@ -137,8 +138,9 @@ class MagcompApp(BaseApp):
         if missing:
             self.notify(missing, severity="warning")
             return
+        outdated = self.current_mode == "record" and self.state.is_outdated
         self.switch_mode(step)
-        if step == "fit" and self.work.analysis is None and self.busy is None:
+        if step == "fit" and (outdated or self.work.analysis is None) and self.busy is None:
             fitting.start(self, self.work.options)
 
     def action_forward(self) -> None:

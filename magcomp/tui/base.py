@@ -109,6 +109,11 @@ class BaseApp(App[None]):
             lambda error: self.post_message(WatchingFailed(error)),
         )
 
+    def tell_drawn(self) -> None:
+        """Ask for the next snapshot, once what was drawn is on the screen."""
+        if self._watcher is not None:
+            self.call_after_refresh(self._watcher.drawn)
+
     def forget_session(self) -> Session | None:
         """Follow the session no more; whoever takes it closes it."""
         session, self.session = self.session, None

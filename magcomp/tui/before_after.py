@@ -48,19 +48,22 @@ class HeadingPair:
 
 @dataclass(frozen=True)
 class HeadingTrace:
-    """How far a compass's headings have moved since the mark, in time.
+    """A compass's headings in time.
 
     Attributes
     ----------
     seconds
         Before now, so from −60 to 0.
     before, after
-        Degrees; NaN where not known.
+        How far each has moved since the mark, degrees; NaN where not known or there is no mark.
+    taken_out
+        What the correction takes out of the heading, degrees; NaN where not known.
     """
 
-    seconds: tuple[float, ...]
-    before: tuple[float, ...]
-    after: tuple[float, ...]
+    seconds: tuple[float, ...] = ()
+    before: tuple[float, ...] = ()
+    after: tuple[float, ...] = ()
+    taken_out: tuple[float, ...] = ()
 
 
 TRACE_S = 60.0
@@ -85,11 +88,15 @@ class HeadingWatch:
         self._largest = {}
         self._times.clear()
 
+    def unmark(self) -> None:
+        """Forget the mark: who has moved on from there tells nothing by it."""
+        if self._mark is not None:
+            self._mark = None
+            self._times.clear()
+
     def look(self, pairs: tuple[HeadingPair, ...], now: float) -> tuple[HeadingPair, ...]:
         """The pairs with how far they have moved; ``now`` in seconds."""
-        if self._mark is None:
-            return pairs
-        moved = tuple(map(self._moved, pairs))
+        moved = pairs if self._mark is None else tuple(map(self._moved, pairs))
         self._times.append((now, moved))
         while now - self._times[0][0] > TRACE_S:
             self._times.popleft()
@@ -99,13 +106,17 @@ class HeadingWatch:
         """The last minute of one compass."""
         last = self._times[-1][0] if self._times else 0.0
         rows = [
-            (time - last, _known(pair.moved_before), _known(pair.moved_after))
+            (
+                time - last,
+                _known(pair.moved_before),
+                _known(pair.moved_after),
+                _known(pair.correction),
+            )
             for time, pairs in self._times
             for pair in pairs
             if pair.compass == compass
         ]
-        seconds, before, after = zip(*rows, strict=True) if rows else ((), (), ())
-        return HeadingTrace(seconds, before, after)
+        return HeadingTrace(*zip(*rows, strict=True)) if rows else HeadingTrace()
 
     def _moved(self, pair: HeadingPair) -> HeadingPair:
         marked = (self._mark or {}).get(pair.compass, (None, None))

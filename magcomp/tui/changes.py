@@ -8,8 +8,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from magcomp import autopilots
-from magcomp.autopilots import Kind
 from magcomp.model import Analysis, ParameterSet
 from magcomp.report import words
 from magcomp.writing.events import (
@@ -24,6 +22,7 @@ from magcomp.writing.events import (
     Written,
 )
 from magcomp.writing.files import format_value
+from magcomp.writing.plan import in_order
 
 
 @dataclass(frozen=True)
@@ -77,20 +76,14 @@ def after_event(rows: tuple[ChangeRow, ...], event: Event) -> tuple[ChangeRow, .
 
 
 def change_rows(present: Mapping[str, float], wanted: ParameterSet | None) -> tuple[ChangeRow, ...]:
-    """The parameters that would change; the motor vectors and their switch first."""
+    """The parameters that would change, in the order in which they would be written."""
     if wanted is None:
         return ()
-    changed = [
-        ChangeRow(name, _text(present.get(name, math.nan)), _text(value))
-        for name, value in wanted.values.items()
-        if name not in present or np.float32(present[name]) != np.float32(value)
-    ]
-    return tuple(sorted(changed, key=lambda row: not _is_of_motors(row.name)))
-
-
-def _is_of_motors(name: str) -> bool:
-    found = autopilots.parse(name)
-    return found is not None and found.kind in (Kind.SWITCH, Kind.MOTOR, Kind.PER_MOTOR)
+    return tuple(
+        ChangeRow(name, _text(present.get(name, math.nan)), _text(wanted.values[name]))
+        for name in in_order(wanted.values)
+        if name not in present or np.float32(present[name]) != np.float32(wanted.values[name])
+    )
 
 
 def left_out_warnings(

@@ -66,6 +66,8 @@ def open_target(app: BaseApp, target: str) -> None:
     if address is None or isinstance(address, Replay):
         _when_free(app, lambda: _open_log(app, Path(target).expanduser()))
     else:
+        if str(address) != target:
+            app.notify(f"{target} means {address}.")
         _when_free(app, lambda: _connect(app, target))
 
 

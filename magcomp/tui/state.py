@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 from magcomp.analysis import Options
@@ -9,6 +10,8 @@ from magcomp.live.situation import Manoeuvre
 from magcomp.live.snapshot import LiveSnapshot
 from magcomp.tui.choices import Choice
 from magcomp.tui.work import Work, Writing
+
+_WORTH_FITTING_S = 10.0
 
 
 @dataclass(frozen=True)
@@ -61,6 +64,19 @@ class State:
     manoeuvre: Manoeuvre | None = None
 
     @property
+    def unfitted_s(self) -> float:
+        """How long the motors ran since the fit shown, seconds; 0 where it was told an end."""
+        work = self.work
+        if self.live is None or work.recording is None or math.isfinite(work.options.end):
+            return 0.0
+        return max(self.live.armed_until_s - work.recording.duration_s, 0.0)
+
+    @property
+    def is_outdated(self) -> bool:
+        """So much was flown since the fit shown that it is worth another one."""
+        return self.work.analysis is not None and self.unfitted_s >= _WORTH_FITTING_S
+
+    @property
     def early(self) -> bool:
         """Too little is recorded yet for a verdict against a compass."""
-        return self.live is not None and self.live.guidance.early
+        return self.live is not None and self.live.early

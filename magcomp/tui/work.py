@@ -120,6 +120,8 @@ class Writing:
     before, in_force
         What the vehicle held before it was written, and what it holds since; empty where it was
         not written.
+    undone
+        What was written was taken back, and nothing was written since.
     promised, since_s
         The fit that was written, and the second of the recording since when it is in force.
     flying
@@ -135,6 +137,7 @@ class Writing:
     acts: str = ""
     before: Mapping[str, float] = field(default_factory=dict)
     in_force: Mapping[str, float] = field(default_factory=dict)
+    undone: bool = False
     promised: Analysis | None = None
     since_s: float = 0.0
     flying: bool = False

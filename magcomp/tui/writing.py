@@ -18,9 +18,11 @@ from magcomp.tui.services import Progress, Session, save_report
 from magcomp.tui.status import WRITING
 from magcomp.tui.work import Work, Writing
 from magcomp.writing.events import Event, Outcome
-from magcomp.writing.files import SUFFIXES, format_value, write_parameter_file
+from magcomp.writing.files import format_value, write_parameter_file
 from magcomp.writing.plan import WritePlan
 from magcomp.writing.writer import raise_for_failure
+
+_THE_VEHICLE = "the vehicle"
 
 
 def prepare(app: BaseApp) -> None:
@@ -61,7 +63,7 @@ def ask_save(app: BaseApp, proposed: str = "") -> None:
         return
     dialog = AskText(
         "Save a parameter file",
-        f"Its end chooses its form: {words.listed(SUFFIXES)}.",
+        "Mission Planner takes .param, QGroundControl .params, MAVProxy .parm.",
         (("File", proposed or str(_proposed(app.work, ".param"))),),
     )
     _ask_file(app, dialog, _save_now)
@@ -221,7 +223,7 @@ def _write(app: BaseApp, plan: WritePlan, backup: Path) -> None:
                 measured=(),
                 measured_trouble="",
             )
-            app.set_work(replace(app.work, kept="the vehicle"))
+            app.set_work(replace(app.work, kept=app.work.kept or _THE_VEHICLE))
 
     app.run_task(WRITING, task, then)
 
@@ -303,8 +305,10 @@ def _undo(app: BaseApp, plan: WritePlan, backup: Path) -> None:
         if _ended(app, outcome, second):
             app.writing = Writing()
             prepare(app)
-            app.writing = replace(app.writing, result="undone: everything is as it was before")
-            app.set_work(replace(app.work, kept=""))
+            result = "undone: everything is as it was before"
+            app.writing = replace(app.writing, result=result, undone=True)
+            kept = app.work.kept  # a file that was saved as well is still there
+            app.set_work(replace(app.work, kept="" if kept == _THE_VEHICLE else kept))
 
     app.run_task(
         WRITING,

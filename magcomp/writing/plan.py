@@ -155,7 +155,7 @@ def plan(
     return WritePlan(
         vehicle=vehicle,
         old=held,
-        new={n: asked[n] for n in _in_order(asked) if not _is_switch(n) and asked[n] != held[n]},
+        new={n: asked[n] for n in in_order(asked) if not _is_switch(n) and asked[n] != held[n]},
         switches={n: asked.get(n, v) for n, v in held.items() if _is_switch(n)},
         identity=identity,
         left_out=tuple(name for name in wanted.values if name not in asked),
@@ -167,7 +167,7 @@ def plan(
     )
 
 
-def _in_order(names: Iterable[str]) -> list[str]:
+def in_order(names: Iterable[str]) -> list[str]:
     """Motor vectors before offsets before soft iron, each vector together; all else after them.
 
     A firmware may look at its parameters in the midst of a write (docs/autopilots.md, PX4: in

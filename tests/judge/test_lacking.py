@@ -51,6 +51,20 @@ def test_the_shares_of_the_motor_vector_grow_with_the_square_of_the_load(flown):
     assert high == pytest.approx(4 * low, rel=0.05)
 
 
+def test_a_fit_motor_by_motor_is_put_down_to_what_its_total_leaves(flown):
+    """The mean of four vectors that are uncertain each for itself is half as uncertain."""
+    found = unsure_of(flown[0], MOTOR)
+    motor = np.tile(found.correction.vector[:, None], 4)
+    variances = np.concatenate([np.diag(found.covariance), np.full(9, 10.0**2)])
+    by_motor = replace(
+        found,
+        correction=replace(found.correction, motor=motor),
+        covariance=np.diag(variances),
+    )
+    one, four = (variance_shares(each, TOP_A)["motor"] for each in (found, by_motor))
+    assert four == pytest.approx(one / 4, rel=1e-3)
+
+
 def test_headings_never_seen_under_load_are_named(flown):
     found, samples = flown
     yaw = np.mod(np.degrees(samples.attitude[:, 2]), 360.0)

@@ -9,8 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from magcomp.live.guide import Guidance
-from magcomp.live.progress import HEADINGS, Enough, HeadingRing
+from magcomp.live.progress import HEADINGS, Early, Enough, HeadingRing
 from magcomp.live.situation import Situation
+from magcomp.model import Analysis, Vehicle
 
 SECTOR = math.tau / HEADINGS
 
@@ -64,3 +65,18 @@ def test_enough_only_rises_whatever_the_vehicle_does(looks):
         assert shown.share_done >= max(before[situation], share)
         assert enough.reached(situation) == (was or is_enough)
         before[situation] = shown.share_done
+
+
+def test_a_verdict_on_too_little_stays_too_early_until_the_next_one():
+    """What was fitted when the flight was too short does not reject a compass once it is long."""
+    little, much = (analysis_of(seconds) for seconds in (40.0, 70.0))
+    early = Early()
+    assert early.look(Guidance("", 0.5, missing=("time",)), 59.0, little)
+    flown = Guidance("", 0.9, missing=("a sure answer",))
+    assert early.look(flown, 75.0, little)
+    assert not early.look(flown, 80.0, much)
+
+
+def analysis_of(seconds: float) -> Analysis:
+    vehicle = Vehicle("ardupilot", "copter", 1, 1)
+    return Analysis("a.tlog", seconds, vehicle, (), ())

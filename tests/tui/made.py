@@ -222,6 +222,7 @@ def snapshot(**changes: object) -> LiveSnapshot:
         armed=True,
         elapsed_s=83.0,
         recorded_s=83.0,
+        armed_until_s=83.0,
         recording_path=Path("recording-20250615T150640Z.tlog"),
         recording_bytes=1_240_000,
         recording=True,
@@ -240,9 +241,8 @@ def snapshot(**changes: object) -> LiveSnapshot:
         wanted_heading_deg=200.0,
         bound=Bound(24.0, "current", (4.1, 3.0, 2.2, 1.7, 1.3)),
         situation=Situation.FLYING,
-        guidance=Guidance(
-            "turn slowly to the right", 0.66, missing=("headings", "a steady answer")
-        ),
+        guidance=Guidance("turn slowly to the right", 0.66, missing=("headings", "a sure answer")),
+        early=True,
         warnings=("compass 3 is not used for the heading (COMPASS_USE is 0)",),
         analysis=None,
         grade=Grade.GOOD,

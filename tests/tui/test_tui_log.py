@@ -219,6 +219,7 @@ async def test_the_difference_can_be_saved_and_is_what_was_shown(tmp_path):
         for row in pilot.app.writing.rows:
             assert np.float32(row.new) == np.float32(saved.values[row.name])
         assert "Saved to" in screen(pilot.app)
+        assert "undoes" not in screen(pilot.app)  # nothing was written to a vehicle
 
 
 async def test_a_file_that_exists_is_overwritten_only_after_a_question(tmp_path):

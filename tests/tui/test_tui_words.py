@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import queue
+import re
 import subprocess
 import sys
+import threading
 from dataclasses import replace
 
 import made
@@ -25,9 +28,13 @@ from magcomp.tui.before_after import HeadingPair, HeadingWatch, heading_pairs
 from magcomp.tui.changes import after_event, change_rows
 from magcomp.tui.fits import difference_deg, fit_rows
 from magcomp.tui.pictures import round_ticks
+from magcomp.tui.state import State
 from magcomp.tui.themes import SUN
+from magcomp.tui.watcher import Watcher
 from magcomp.tui.widgets.bars import bar
-from magcomp.tui.widgets.live_facts import bound_words, sparkline, trend
+from magcomp.tui.widgets.coverage_map import LevelRow, LevelTable
+from magcomp.tui.widgets.heading_ring import HeadingRing, Ring
+from magcomp.tui.widgets.live_facts import Facts, LiveFacts, bound_words, sparkline, trend
 from magcomp.tui.work import Writing
 from magcomp.writing.events import Mismatch, Outcome, Reason, RollingBack, Standing, Written
 
@@ -152,7 +159,96 @@ def test_the_bound_says_how_much_longer_until_it_is_enough(enough_at_s, recorded
         recorded_s=recorded_s,
         guidance=Guidance("keep flying", 0.5, enough=enough),
     )
-    assert bound_words(live).endswith(f"at 24 A{words}")
+    assert bound_words(live, 200).endswith(f"at 24 A{words}")
+
+
+@pytest.mark.parametrize("room", range(28, 90, 3))
+def test_what_a_pilot_acts_on_is_said_however_narrow_the_terminal_is(room):
+    bound = Bound(24.0, "current", (2.0, 1.7, 1.3), 140.0)
+    live = made.snapshot(bound=bound, recorded_s=98.0, guidance=Guidance("keep flying", 0.5))
+    said = bound_words(live, room)
+    assert said.startswith("at hover at most 1.3°")
+    assert said.endswith("; about 40 s more")
+    assert len(said) <= max(room, len("at hover at most 1.3°; about 40 s more"))
+
+
+@pytest.mark.parametrize("width", range(18, 70, 4))
+@pytest.mark.parametrize("height", range(5, 30, 3))
+def test_two_headings_on_the_ring_never_run_into_one_number(width, height):
+    ring = Ring(tuple(range(30, 54)), None, None)
+    drawn = HeadingRing().picture(ring, width, height).plain
+    assert all(len(digits) <= 2 for digits in re.findall(r"\d+", drawn))
+
+
+def test_a_ring_too_small_for_numbers_has_a_bar_for_each_heading():
+    best = (*(40,) * 12, *(80,) * 11, None)
+    drawn = HeadingRing().picture(Ring(best, None, None), 36, 8).plain
+    assert (drawn.count("▄"), drawn.count("█"), drawn.count("·")) == (12, 11, 1)
+
+
+@pytest.mark.parametrize("now", range(10))
+@pytest.mark.parametrize("height", [4, 6, 8])
+def test_the_throttle_now_is_always_in_the_table_of_levels(now, height):
+    rows = tuple(LevelRow(level, 9.0, 3, False, level == now) for level in range(10))
+    drawn = LevelTable().picture(rows, 30, height).plain.split("\n")
+    assert len(drawn) == height
+    assert any(line.startswith(f"▸{10 * now:3d}–") for line in drawn)
+
+
+@pytest.mark.parametrize(
+    ("width", "said"),
+    [
+        (78, "missing: headings, climbs and descents, a sure answer"),
+        (58, "missing: headings, …"),
+    ],
+)
+def test_what_is_missing_is_not_cut_within_a_name(width, said):
+    facts = Facts(0.7, ("headings", "climbs and descents", "a sure answer"), "a.tlog", "1 MB", 9, 9)
+    line = LiveFacts().picture(facts, width, 2).plain.split("\n")[0]
+    assert line.endswith(said)
+    assert len(line) <= width
+
+
+def test_a_fit_is_outdated_once_more_was_flown_and_not_by_standing_about():
+    work = made.work(live=True)
+    fitted_s = work.recording.duration_s
+    live = made.snapshot(armed_until_s=fitted_s + 30.0, recorded_s=fitted_s + 30.0)
+    assert State(work, live=live).is_outdated
+    standing = replace(live, armed_until_s=fitted_s, recorded_s=fitted_s + 300.0)
+    assert not State(work, live=standing).is_outdated
+    asked = replace(work, options=Options(end=60.0))
+    assert not State(asked, live=live).is_outdated
+
+
+def test_no_snapshot_is_posted_before_the_last_one_is_on_the_screen(monkeypatch):
+    monkeypatch.setattr("magcomp.tui.watcher.EVERY_S", 0.0)
+    posted, on_its_way, overtaken = queue.Queue(), threading.Event(), threading.Event()
+
+    def post(snapshot):
+        if on_its_way.is_set():
+            overtaken.set()
+        on_its_way.set()
+        posted.put(snapshot)
+
+    watcher = Watcher(made.snapshot, post, posted.put)
+    try:
+        for _ in range(50):
+            assert posted.get(timeout=scripted.PATIENCE_S)
+            on_its_way.clear()
+            watcher.drawn()
+    finally:
+        watcher.close()
+    assert not overtaken.is_set()
+
+
+def test_a_mark_is_forgotten_once_the_vehicle_has_moved_on():
+    watch = HeadingWatch()
+    watch.mark((HeadingPair(1, 10.0, 10.0),))
+    watch.look((HeadingPair(1, 190.0, 180.0),), 0.0)
+    watch.unmark()
+    (pair,) = watch.look((HeadingPair(1, 190.0, 180.0),), 0.1)
+    assert pair.moved_before is None
+    assert watch.trace(1).taken_out == (-10.0,)
 
 
 @pytest.mark.parametrize(

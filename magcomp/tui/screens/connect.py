@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import ClassVar
 
 from textual.binding import Binding, BindingType
@@ -13,11 +13,22 @@ from textual.widgets import Input, OptionList, Static
 from textual.widgets.option_list import Option
 
 from magcomp.report import words
+from magcomp.tui import status
 from magcomp.tui.choices import SIMULATED, Choice
 from magcomp.tui.messages import PortsWanted, TargetChosen
 from magcomp.tui.screens.step import StepScreen
 from magcomp.tui.vehicle_card import VehicleCard
+from magcomp.tui.widgets.top_bar import STEPS
 
+_DONE_THERE = {
+    "connect": "A vehicle, a log, or a simulated vehicle to try it.",
+    "record": "Fly two minutes: turns, climbs, descents. It is said what is still missing.",
+    "fit": "How wrong the heading is now, and how wrong at most with the new numbers.",
+    "review": "To a file, or to the vehicle after a question. The old numbers are kept; U brings "
+    "them back.",
+    "verify": "Fly as before: what was promised stands beside what was measured.",
+}
+_TYPE = "Type an address such as udp:14550, or the path of a log, and press Enter."
 _TARGET_CELLS = 36
 _ONE_LINE_CELLS = 76
 
@@ -65,9 +76,15 @@ result. Nothing has been written or changed yet.
         """One text in a scroll."""
         yield Static(id="card-text")
 
-    def show(self, card: VehicleCard | None) -> None:
-        """Draw a card."""
-        self.query_one("#card-text", Static).update(card_text(card))
+    def show(self, card: VehicleCard | None, steps: Sequence[str] = ()) -> None:
+        """Draw a card, and below it what is done in some steps."""
+        text = Content("\n\n").join([card_text(card), *map(step_text, steps)])
+        self.query_one("#card-text", Static).update(text)
+
+
+def step_text(step: str) -> Content:
+    """What is done in a step of the road."""
+    return Content.assemble((STEPS[step], "bold"), f"\n{_DONE_THERE[step]}")
 
 
 def card_text(card: VehicleCard | None) -> Content:
@@ -149,7 +166,8 @@ class ConnectScreen(StepScreen):
         """Draw the vehicle and what to do next."""
         work, busy, live = self.state.work, self.state.busy, self.state.live
         self._fill(self.state.choices)
-        self.query_one(CardView).show(work.card)
+        roomy = self.has_class("-wide") and self.has_class("-tall")
+        self.query_one(CardView).show(work.card, self._to_come() if roomy else ())
         if work.source != self._source:
             self._source = work.source
             self.query_one("#choices").focus()
@@ -161,11 +179,17 @@ class ConnectScreen(StepScreen):
         elif live is not None and work.card is None:
             self.say(f"Wait: {live.guidance.text}. X gives up. {words.sentence(live.link_text)}")
         elif work.card is None:
-            self.say("Choose with the arrows and press Enter, or press A to type.")
+            typing = self.query_one(AddressInput).has_focus
+            self.say(_TYPE if typing else "Choose with the arrows and press Enter, or A to type.")
         elif work.live:
             self.say("Press N to record. X disconnects.")
         else:
             self.say("Press N to see the fit of this log. X closes it.")
+
+    def _to_come(self) -> tuple[str, ...]:
+        """The steps of this road that lie ahead."""
+        steps = status.road(self.state.work)
+        return steps[1:] if self.state.work.card is not None else steps
 
     def on_resize(self) -> None:
         """Fill the list anew: how many lines a choice has depends on the room."""
@@ -187,6 +211,10 @@ class ConnectScreen(StepScreen):
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:  # noqa: ARG002
         """Hide what is done with."""
         return action not in ("address", "ports") or not self.state.work.source
+
+    def on_descendant_focus(self) -> None:
+        """Say what to do where the focus is now."""
+        self.redraw()
 
     def action_address(self) -> None:
         """Type an address."""

@@ -33,6 +33,8 @@ VIEWS = {
     "verdict": "Verdict",
     "fits": "Fits side by side",
 }
+_TWO_VIEWS = 28
+"""Lines of a screen on which two views are worth their room."""
 _OPTION_KEYS = ("fit.method", "fit.regressor", "fit.compasses", "fit.time")
 
 _T = TypeVar("_T")
@@ -72,6 +74,7 @@ and C change method, regressor, time range and compasses, and fit again at once;
         super().__init__()
         self._compass = 0
         self._view = "heading"
+        self._two = False
         self._drawn: tuple[CompassPicture, Analysis] | None = None
         self._line: tuple[Analysis | None, str] = (None, "")
 
@@ -166,13 +169,27 @@ and C change method, regressor, time range and compasses, and fit again at once;
     def _next(self, analysis: Analysis | None) -> str:
         if analysis is None:
             return "Press F to fit what was recorded."
-        if analysis.grade is Grade.REJECTED:
-            if self.state.early:
-                return "Too early for an answer: press B, record more, then press N and F."
+        rejected = analysis.grade is Grade.REJECTED
+        if self.state.is_outdated:
+            more = words.duration(self.state.unfitted_s)
+            other = "" if rejected else ", or N to write this"
+            return f"{more} came since this fit: press F to fit that too{other}."
+        if rejected and self.state.early:
+            return "Too early for an answer: press B, record more, then press N."
+        if rejected:
             return "Do what the first line says, record again, and fit again. M: other method."
         return "Look at the pictures (V), then press N to see what would be written."
 
+    def on_resize(self) -> None:
+        """Show one view, or a second one below the first where the screen is high."""
+        super().on_resize()
+        self._two = self.size.height >= _TWO_VIEWS and not self.has_class("-wide")
+        self.query_one("#view-heading").set_class(self._two, "-first")
+        self._show_view()
+
     def _show_view(self) -> None:
+        if self._two and self._view == "heading":
+            self._view = "verdict"
         for name in VIEWS:
             self.query_one(f"#view-{name}").set_class(name == self._view, "-shown")
         self.call_after_refresh(self._focus_view)
@@ -196,6 +213,8 @@ and C change method, regressor, time range and compasses, and fit again at once;
         """Show the next view."""
         several = len(self.state.work.tried) > 1
         names = [name for name in VIEWS if several or name != "fits"]
+        if self._two:
+            names.remove("heading")
         if self._view not in names:
             self._view = names[-1]
         self._view = names[(names.index(self._view) + 1) % len(names)]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import textwrap
+from collections.abc import Iterable, Sequence
 from typing import ClassVar
 
 from textual.binding import Binding, BindingType
@@ -27,6 +28,7 @@ _SAID = {
     Manoeuvre.SWEEP: "Taken as tied down.",
 }
 
+_MIND = "Mind: "
 _FEW = 2
 _MANY = 6
 
@@ -76,7 +78,7 @@ press M to say it, once or more, until the *next* line names it.
 
     def on_mount(self) -> None:
         """Name the panels."""
-        self.query_one("#turned").border_title = "Headings, % throttle"
+        self.query_one("#turned").border_title = "Headings, throttle"
         self.query_one("#seen").border_title = "Attitudes seen"
         self.query_one("#held").border_title = "Throttle levels"
         self.query_one("#controls").border_title = "Motors"
@@ -89,7 +91,8 @@ press M to say it, once or more, until the *next* line names it.
             return
         self.set_class(not live.connected, "-stale")
         self.set_class(live.situation in (Situation.HELD, Situation.STILL), "-held")
-        self.query_one("#now").border_title = _compasses_title(live)
+        now_panel = self.query_one("#now")
+        now_panel.border_title = _compasses_title(live, now_panel.size.width - 2)
         wanted = live.wanted_heading_deg
         self.query_one("#turned").border_subtitle = (
             "all seen" if wanted is None else f"{WANTED} next, {round(wanted) % 360}°"
@@ -98,6 +101,8 @@ press M to say it, once or more, until the *next* line names it.
         self.query_one(ControlBars).show(live)
         self.query_one(HeadingRing).show(live)
         self.query_one(CoverageMap).show(live.coverage)
+        share = (live.coverage.counts.sum(axis=0) > 0).mean()
+        self.query_one("#seen").border_subtitle = f"{100 * share:.0f} % seen"
         now = None if live.throttle is None else min(int(live.throttle * LEVELS), LEVELS - 1)
         level_table = self.query_one(LevelTable)
         level_table.show(live.coverage, live.level_seconds, live.levels_done, now)
@@ -107,19 +112,29 @@ press M to say it, once or more, until the *next* line names it.
 
     def _show_mind(self, live: LiveSnapshot) -> None:
         room = _MANY if self.has_class("-tall") else _FEW
-        mind = Content("\n").join(
-            Content.assemble(("Mind: ", "bold $warning"), words.sentence(text))
-            for text in live.warnings[:room]
-        )
+        mind = mind_text(live.warnings, self.size.width - 2, room)
         if mind.plain != self._mind:
             self._mind = mind.plain
             self.query_one("#mind", Static).update(mind)
 
 
-def _compasses_title(live: LiveSnapshot) -> str:
+def mind_text(warnings: Sequence[str], width: int, lines: int) -> Content:
+    """What a pilot should know, in so many lines; what does not fit ends in a sign for that."""
+    told: list[Content] = []
+    for warning in warnings:
+        text = f"{_MIND}{words.sentence(warning)}"
+        wrapped = textwrap.wrap(text, width, max_lines=lines - len(told), placeholder=" …")
+        first, *others = map(Content, wrapped)
+        told += [first.stylize("bold $warning", 0, len(_MIND)), *others]
+        if len(told) >= lines:
+            break
+    return Content("\n").join(told)
+
+
+def _compasses_title(live: LiveSnapshot, room: int) -> str:
     """The bound stands above everything: it is what the recording is for."""
     title = "Compasses" if live.connected else "Compasses, as last heard"
-    return ": ".join(filter(None, (title, bound_words(live))))
+    return ": ".join(filter(None, (title, bound_words(live, room - len(title) - 2))))
 
 
 def next_sentence(live: LiveSnapshot, manoeuvre: Manoeuvre | None = None) -> str:

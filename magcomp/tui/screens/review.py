@@ -15,18 +15,21 @@ from textual.widgets import DataTable, ProgressBar, Static
 from magcomp.live.snapshot import LiveSnapshot
 from magcomp.model import Analysis, Grade
 from magcomp.report import words
+from magcomp.report.as_json import analysis_object
+from magcomp.report.plain import pilots_lines
 from magcomp.tui.changes import ChangeRow
 from magcomp.tui.messages import CompassToggled
 from magcomp.tui.screens.step import StepScreen
+from magcomp.tui.widgets.heading_table import HeadingTable
 from magcomp.tui.widgets.verdict_text import grade_word
 
 
 class ChangeTable(DataTable[Text]):
-    """Parameters: now, new, and how far each is."""
+    """Parameters: old, new, and how far each is."""
 
     HELP = """\
-**What would be written.** *Now* is what the vehicle holds, *new* what it would hold. Parameters
-that stay as they are are not listed.
+**What would be written.** *Old* is what the vehicle held before, *new* what it then holds.
+Parameters that stay as they are are not listed.
 
 The order of writing is safe at every moment: compensation off, values, read back, compensation on.
 """
@@ -56,11 +59,13 @@ class ReviewScreen(StepScreen):
 
     def body(self) -> Iterable[Widget]:
         """Which compasses, the table, where the backup goes, progress and result."""
+        yield Static(id="reason")
         yield Static(id="grades")
         with Horizontal(id="difference"):
             yield ChangeTable(id="changes", cursor_type="row", cell_padding=0)
             with VerticalScroll(id="brings", classes="panel", can_focus=False):
                 yield Static(id="brings-text")
+                yield HeadingTable(id="brings-headings")
         yield Static(id="place")
         yield ProgressBar(total=1.0, show_eta=False, id="progress")
 
@@ -68,8 +73,8 @@ class ReviewScreen(StepScreen):
         """Columns, and the focus on the table so that arrows scroll it."""
         table = self.query_one(ChangeTable)
         table.border_title = "Parameters that change"
-        for name, width in (("Parameter", 16), ("Now", 12), ("New", 13), ("", 14)):
-            label = Text(name, justify="right" if name in ("Now", "New") else "left")
+        for name, width in (("Parameter", 16), ("Old", 12), ("New", 13), ("", 14)):
+            label = Text(name, justify="right" if name in ("Old", "New") else "left")
             table.add_column(label, key=name or "state", width=width)
         table.focus()
         self.query_one("#brings").border_title = "What it brings"
@@ -85,6 +90,8 @@ class ReviewScreen(StepScreen):
             self.query_one("#grades", Static).update(chosen_line(work.analysis, work.chosen))
             self._show_benefit(work.analysis)
         writing = self.state.writing
+        # Once it is written, the line that says so below counts.
+        self.query_one("#reason").display = work.analysis is not None and not writing.in_force
         self._fill(writing.rows)
         table = self.query_one(ChangeTable)
         table.border_subtitle = f"{len(writing.rows)} parameters"
@@ -96,7 +103,14 @@ class ReviewScreen(StepScreen):
     def _show_benefit(self, analysis: Analysis) -> None:
         if analysis is not self._benefit:
             self._benefit = analysis
-            self.query_one("#brings-text", Static).update(benefit(analysis))
+            line = pilots_lines(analysis_object(analysis))[0]
+            self.query_one("#reason", Static).update(Content(line))
+            shown = self.state.work.pictures[min(self.state.work.pictures)]
+            title = Content.styled(
+                f"\n\nHeading error of compass {shown.result.fit.compass}", "bold"
+            )
+            self.query_one("#brings-text", Static).update(benefit(analysis) + title)
+            self.query_one(HeadingTable).show(shown.errors)
 
     def _fill(self, rows: tuple[ChangeRow, ...]) -> None:
         if rows == self._rows:
@@ -112,7 +126,7 @@ class ReviewScreen(StepScreen):
         for index, (new, old) in enumerate(zip(rows, before, strict=True)):
             if new != old:
                 for column, cell in zip(
-                    ("Parameter", "Now", "New", "state"), _cells(new), strict=True
+                    ("Parameter", "Old", "New", "state"), _cells(new), strict=True
                 ):
                     table.update_cell(new.name, column, cell)
                 table.move_cursor(row=index)
@@ -134,9 +148,11 @@ class ReviewScreen(StepScreen):
             return "There is nothing to write: press B and look at the fit."
         if not self.state.writing.rows:
             return "Nothing would change. Press 1, 2 or 3 to choose compasses, or B to go back."
+        if not work.live and work.kept:
+            return "Saved. Load it with your ground station, fly once more, and open that log."
         if not work.live:
             return "Press S to save these parameters to a file for your ground station."
-        if work.kept:
+        if self.state.writing.in_force:
             return "Press N to see the heading with the motors running. U undoes the writing."
         return how_to_write(self.state.live)
 

@@ -18,8 +18,14 @@ from magcomp.tui.screens.step import StepScreen
 from magcomp.tui.state import State
 from magcomp.tui.widgets.heading_pairs import HeadingPairs, HeadingPlot
 from magcomp.tui.widgets.live_table import ControlBars
+from magcomp.tui.work import Writing
 
 _PLOT_EVERY_S = 0.5
+_MARKED_LINES = 3
+_EDGES = 2
+_CONTROLS = 4
+_LEAST_PLOT = 8
+"""Lines: of a compass with a mark, of a panel's border, of the motors, of a plot worth its room."""
 
 
 class VerifyScreen(StepScreen):
@@ -45,6 +51,7 @@ class VerifyScreen(StepScreen):
         self._said = ""
         self._compass = 1
         self._plotted_at = -_PLOT_EVERY_S
+        self._looks = (False, 0, False)
 
     def body(self) -> Iterable[Widget]:
         """Motors above, headings below."""
@@ -70,14 +77,31 @@ class VerifyScreen(StepScreen):
             self.say("Connect to a vehicle first.")
             return
         now = state.live.elapsed_s
+        if state.live.situation is Situation.FLYING:
+            self._watch.unmark()
         self._pairs = self._watch.look(heading_pairs(state.live, state.work, state.writing), now)
         self.query_one(ControlBars).show(state.live)
         self.query_one(HeadingPairs).show(self._pairs, marked=self._watch.marked)
-        if abs(now - self._plotted_at) >= _PLOT_EVERY_S and self.has_class("-tall"):
-            self._plotted_at = now
-            self.query_one(HeadingPlot).show(self._watch.trace(self._compass))
         self._show_state()
+        self._make_room()
+        if abs(now - self._plotted_at) >= _PLOT_EVERY_S and self.has_class("-plot"):
+            self._plotted_at = now
+            trace = self._watch.trace(self._compass)
+            self.query_one(HeadingPlot).show(trace, marked=self._watch.marked)
         self.say(state.busy.sentence if state.busy is not None else self._next())
+
+    def _make_room(self) -> None:
+        """Give the headings the lines they need, and the rest to the plot where that is enough."""
+        lines = 1 + len(self._pairs) * (_MARKED_LINES if self._watch.marked else 1) + _EDGES
+        above_below = _CONTROLS + self._said.count("\n") + 1
+        plot = self.query_one(".body").size.height - above_below - lines >= _LEAST_PLOT
+        looks = (plot, lines, self._watch.marked)
+        if looks != self._looks:
+            self._looks = looks
+            self.set_class(plot, "-plot")
+            self.query_one("#pairs").styles.height = lines if plot else "1fr"
+            self._name_plot()
+            self.refresh_bindings()
 
     def _show_state(self) -> None:
         said = "\n".join(state_lines(self.state))
@@ -93,15 +117,19 @@ class VerifyScreen(StepScreen):
             return "Hold a heading, climb and descend: “takes out” grows with the throttle."
         if writing.measured:
             return "Done: Q ends and says where your files are. Fly on to measure again."
-        if writing.in_force and not self._watch.marked:
+        if self._watch.marked:
+            after = "Q ends." if writing.in_force else "B goes back to write."
+            return f"With the motors “before” moves, “corrected” stays. {after}"
+        if writing.in_force:
             return "Fly as before and land: it is then measured. On the ground: M, see F1."
-        if not self._watch.marked:
-            return "Propellers off or tied down: press M, run the motors, watch “moved”."
-        return "With the motors “before” moves, “corrected” stays. Q ends."
+        return "Propellers off or tied down: press M, run the motors, watch “moved”."
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:  # noqa: ARG002
-        """Hide the choice of a plot where there is no room for one."""
-        return action != "compass" or self.has_class("-tall")
+        """Hide the choice of a plot where there is none, and a mark that the next turn spoils."""
+        live = self.state.live
+        flying = live is not None and live.situation is Situation.FLYING
+        shown = {"compass": self.has_class("-plot"), "mark": not flying}
+        return shown.get(action, True)
 
     def action_compass(self, compass: int) -> None:
         """Plot another compass."""
@@ -110,8 +138,10 @@ class VerifyScreen(StepScreen):
 
     def _name_plot(self) -> None:
         plot = self.query_one("#trace")
-        plot.border_title = f"Compass {self._compass}: heading moved since the mark, °"
-        plot.border_subtitle = "x before   • corrected"
+        marked = self._watch.marked
+        what = "heading moved since the mark" if marked else "what the correction takes out"
+        plot.border_title = f"Compass {self._compass}: {what}, °"
+        plot.border_subtitle = "x before   • corrected" if marked else "a minute, till now"
 
     def action_mark(self) -> None:
         """Measure from the headings as they are."""
@@ -126,10 +156,16 @@ def state_lines(state: State) -> tuple[str, ...]:
         return tuple(promise.sentence for promise in writing.measured)
     if writing.measured_trouble:
         return (writing.measured_trouble,)
-    if writing.acts:
-        return (words.sentence(writing.acts), "“Before” is worked out from the backup.")
     if writing.in_force:
-        return ("The new parameters are in force; “before” is worked out from the backup.",)
+        return _in_force_lines(writing)
+    if writing.undone and writing.result:
+        return (words.sentence(writing.result),)
     if state.work.analysis is not None:
         return ("Nothing is written yet; “corrected” is worked out from the fit.",)
     return ("Nothing is fitted yet, so there is nothing to compare.",)
+
+
+def _in_force_lines(writing: Writing) -> tuple[str, ...]:
+    if writing.acts:
+        return (words.sentence(writing.acts), "“Before” is worked out from the backup.")
+    return ("The new parameters are in force; “before” is worked out from the backup.",)

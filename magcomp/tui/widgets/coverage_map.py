@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,12 +27,9 @@ class Seen:
     ----------
     grades
         0 not seen, 1 a little, 2 enough, for each band and in it each sector.
-    share
-        Of the sphere that was seen, 0 … 1.
     """
 
     grades: tuple[tuple[int, ...], ...]
-    share: float
 
 
 class CoverageMap(Drawn[Seen]):
@@ -47,7 +45,7 @@ little, `██` enough. A level turn fills one row; tilting fills the others.
         """Draw all levels together."""
         seen = coverage.counts.sum(axis=0)
         grades = ((seen > 0).astype(np.int8) + (seen >= _MANY)).reshape(BANDS, SECTORS)
-        self.draw_data(Seen(tuple(map(tuple, grades.tolist())), float((seen > 0).mean())))
+        self.draw_data(Seen(tuple(map(tuple, grades.tolist()))))
 
     def picture(self, data: Seen, width: int, height: int) -> Content:
         """A map whose cells grow with the room."""
@@ -61,8 +59,7 @@ little, `██` enough. A level turn fills one row; tilting fills the others.
             lines += [Content.assemble(" " * _NAMES, *cells)] * (high - 1)
         names = ("front", "right", "back", "left")
         sides = "".join(f"{side[: 3 * wide - 1]:<{3 * wide}}" for side in names)
-        foot = f"{'':{_NAMES}}{sides}{100 * data.share:3.0f} %"
-        return Content("\n").join([*lines, Content.styled(foot, "$quiet")])
+        return Content("\n").join([*lines, Content.styled(f"{'':{_NAMES}}{sides}", "$quiet")])
 
 
 @dataclass(frozen=True)
@@ -118,10 +115,12 @@ this throttle for an ellipsoid of its own; a flight does not need that.
 
     def picture(self, data: tuple[LevelRow, ...], width: int, height: int) -> Content:
         """A line a level."""
-        rows = [row for row in data if row.held_s >= 0.5 or row.now or height > LEVELS]
+        rows = _in_room(data, height - 1)
         length = min(max(width - 26, 4), 24)
         lines = [Content.styled(" throttle      held  turned", "$quiet")]
+        roomy = height > 2 * LEVELS
         for row in rows:
+            lines += [Content("")] if roomy else []
             pointer = "▸" if row.now else " "
             span = f"{10 * row.level:3d}–{10 * row.level + 10:3d} %"
             lines.append(
@@ -134,3 +133,13 @@ this throttle for an ellipsoid of its own; a flight does not need that.
         if not rows:
             lines.append(Content.styled(" none yet", "$quiet"))
         return Content("\n").join(lines)
+
+
+def _in_room(data: Sequence[LevelRow], room: int) -> Sequence[LevelRow]:
+    """The levels there is room for: what was held, and of that what lies about the throttle now."""
+    if len(data) <= room:
+        return data
+    rows = [row for row in data if row.held_s >= 0.5 or row.now]
+    here = next((index for index, row in enumerate(rows) if row.now), 0)
+    first = min(max(here - room // 2, 0), max(len(rows) - room, 0))
+    return rows[first : first + max(room, 1)]

@@ -80,17 +80,21 @@ out* grow with the throttle.
 
 
 class HeadingPlot(Picture):
-    """How far the headings of one compass have moved since the mark, in the last minute."""
+    """How far the headings of one compass have moved since the mark, in the last minute.
+
+    Before there is a mark: what the correction takes out of them.
+    """
 
     HELP = HeadingPairs.HELP
 
     def __init__(self, *, id: str | None = None) -> None:  # noqa: A002 - Textual's own name
         super().__init__(id=id)
-        self._trace = HeadingTrace((), (), ())
+        self._trace = HeadingTrace()
+        self._marked = False
 
-    def show(self, trace: HeadingTrace) -> None:
+    def show(self, trace: HeadingTrace, *, marked: bool) -> None:
         """Draw one compass."""
-        self._trace = trace
+        self._trace, self._marked = trace, marked
         self.draw_plot()
 
     def draw_plot(self) -> None:
@@ -99,11 +103,10 @@ class HeadingPlot(Picture):
         if not self.is_attached:
             return
         self.begin("seconds")
-        known = [v for v in (*trace.before, *trace.after) if math.isfinite(v)]
-        for values, marker, colour in (
-            (trace.before, "x", "error"),
-            (trace.after, "dot", "success"),
-        ):
+        moved = (trace.before, "x", "error"), (trace.after, "dot", "success")
+        drawn = moved if self._marked else ((trace.taken_out, "dot", "accent"),)
+        known = [v for values, _, _ in drawn for v in values if math.isfinite(v)]
+        for values, marker, colour in drawn:
             rows = zip(trace.seconds, values, strict=True)
             finite = [(time, value) for time, value in rows if math.isfinite(value)]
             if finite:

@@ -17,8 +17,9 @@ _NEARLY = 0.8
 """Share of the largest throttle from which a heading counts as seen under load."""
 
 _NEEDLE = (0.25, 0.45, 0.65)
-_PAIRS = 9
-"""Cells from the middle to the side at which there is room for two signs a sector."""
+_EIGHTHS = "▁▂▃▄▅▆▇█"
+_APART = 3
+"""Cells from one pair of digits to the next at which the two can be told apart."""
 
 WANTED = "◇"
 """Marks where to turn next."""
@@ -48,9 +49,9 @@ class HeadingRing(Drawn[Ring]):
 
     HELP = """\
 **Headings seen.** North is on top. Each pair of digits is the largest throttle, in per cent, at
-which the vehicle was heading there (a small ring has room for the tens only); `··` was not seen
-yet. The needle is the heading now, and `◇` is where to turn next. A flight is enough when the ring
-is full and climbs and descents are in it.
+which the vehicle was heading there; a small ring has a bar instead, from `▁` to `█` for the largest
+throttle of all. `·` was not seen yet. The needle is the heading now, and `◇` is where to turn next.
+A flight is enough when the ring is full and climbs and descents are in it.
 """
 
     def show(self, live: LiveSnapshot) -> None:
@@ -77,15 +78,16 @@ is full and climbs and descents are in it.
                 canvas.put(x, y, "•", "bold $accent")
         most = max((best for best in data.best if best is not None), default=0)
         here = None if data.heading is None else _sector(data.heading)
-        for sector, best in enumerate(data.best):
-            angle = (sector + 0.5) * math.tau / HEADINGS
-            text, style = _cell(best, most)
+        angles = [(sector + 0.5) * math.tau / HEADINGS for sector in range(HEADINGS)]
+        places = [(across * math.sin(a), _off_axis(-up * math.cos(a))) for a in angles]
+        cells = 2 if _have_room(places) else 1
+        for sector, (best, place) in enumerate(zip(data.best, places, strict=True)):
+            text, style = _cell(best, most, cells)
             if sector == data.wanted:
-                text, style = 2 * WANTED, "bold $accent"
+                text, style = cells * WANTED, "bold $accent"
             if sector == here:
                 style = f"{style} reverse"
-            shown = text if across >= _PAIRS else text[:1]
-            canvas.put(across * math.sin(angle), -up * math.cos(angle), shown, style)
+            canvas.put(*place, text, style)
         text = "–" if data.heading is None else f"{data.heading}°"
         canvas.put(-0.5 * (len(text) - 1), 0.0, text, "bold")
         return canvas.content()
@@ -116,10 +118,27 @@ def _runs(row: list[tuple[str, str]]) -> Iterator[tuple[str, str]]:
         yield "".join(sign for sign, _ in cells), style
 
 
-def _cell(best: int | None, most: int) -> tuple[str, str]:
+def _off_axis(y: float) -> float:
+    """Not on the line through the middle, where a flat ring's neighbours would share a cell."""
+    return math.copysign(max(abs(y), 0.51), y)
+
+
+def _have_room(places: list[tuple[float, float]]) -> bool:
+    """Whether two digits at each place stay apart from the next."""
+    cells = sorted((round(y), round(x)) for x, y in places)
+    return all(
+        other - one >= _APART
+        for (row, one), (other_row, other) in itertools.pairwise(cells)
+        if row == other_row
+    )
+
+
+def _cell(best: int | None, most: int, cells: int) -> tuple[str, str]:
     if best is None:
-        return "··", "$quiet"
-    return f"{min(best, 99):2d}", "$success" if best >= _NEARLY * most else "$warning"
+        return cells * "·", "$quiet"
+    share = best / max(most, 1)
+    text = f"{min(best, 99):2d}" if cells == 2 else _EIGHTHS[max(math.ceil(8 * share), 1) - 1]
+    return text, "$success" if share >= _NEARLY else "$warning"
 
 
 def _sector(degrees: float) -> int:

@@ -15,6 +15,7 @@ from magcomp.tui.widgets.drawn import Drawn
 _FIELD_MESSAGES = ("RAW_IMU", "SCALED_IMU", "SCALED_IMU2", "SCALED_IMU3")
 _SPARKS = "▁▂▃▄▅▆▇█"
 _SPARK_CELLS = 12
+_SHORTEST = 4
 _LOOK_BACK = 3
 _TO_FIVES_S, _TO_TENS_S = 20.0, 95.0
 _STEADY = 0.1
@@ -65,11 +66,11 @@ class LiveFacts(Drawn[Facts]):
 
     def picture(self, data: Facts, width: int, height: int) -> Content:  # noqa: ARG002
         """The lines; of a long name the end counts."""
-        missing = f"  missing: {', '.join(data.missing)}" if data.missing else ""
+        share = f" {100 * data.share:3.0f} %"
+        said = share + _missing(data.missing, width - 9 - _SHORTEST - len(share))
+        length = min(max(width // 4, 8), 30, max(width - 9 - len(said), _SHORTEST))
         first = Content.assemble(
-            (" enough  ", "$quiet"),
-            bar(data.share, min(max(width // 4, 8), 30), style="$success"),
-            f" {100 * data.share:3.0f} %{missing}",
+            (" enough  ", "$quiet"), bar(data.share, length, style="$success"), said
         )
         minutes, seconds = divmod(data.seconds, 60)
         rest = f"  {data.size}   time {minutes:02d}:{seconds:02d}   compass {data.rate} Hz"
@@ -79,17 +80,37 @@ class LiveFacts(Drawn[Facts]):
         return Content("\n").join([first, Content.assemble((" file    ", "$quiet"), where)])
 
 
-def bound_words(live: LiveSnapshot) -> str:
+def _missing(names: tuple[str, ...], room: int) -> str:
+    """What is missing; names that there is no room for are left out whole."""
+    for count in range(len(names), 0, -1):
+        text = f"  missing: {', '.join(names[:count])}{', …' if count < len(names) else ''}"
+        if len(text) <= room or count == 1:
+            return text
+    return ""
+
+
+def bound_words(live: LiveSnapshot, room: int) -> str:
     """``at hover at most 1.3° (95 %), falling ▇▅▃▂ at 24 A; about 40 s more``.
 
-    Empty before there is a bound.
+    Empty before there is a bound. Where there is less ``room``, in cells, the picture and the load
+    go first: what a pilot acts on is the bound, and how long it still takes.
     """
     if live.bound is None:
         return "" if live.grade is None else "too early for a bound"
     bound = live.bound
-    at = words.quantity(bound.u, bound.regressor)
-    course = f", {trend(bound)} {sparkline(bound.degrees)}" if len(bound.degrees) > 1 else ""
-    return f"at hover at most {bound.degrees[-1]:.1f}° (95 %){course} at {at}{_more(live, bound)}"
+    several = len(bound.degrees) > 1
+    most = f"at hover at most {bound.degrees[-1]:.1f}°"
+    course = f", {trend(bound)}" if several else ""
+    picture = f" {sparkline(bound.degrees)}" if several else ""
+    at = f" at {words.quantity(bound.u, bound.regressor)}"
+    more = _more(live, bound)
+    forms = (
+        f"{most} (95 %){course}{picture}{at}{more}",
+        f"{most} (95 %){course}{picture}{more}",
+        f"{most} (95 %){course}{more}",
+        f"{most}{course}{more}",
+    )
+    return next((form for form in forms if len(form) <= room), f"{most}{more}")
 
 
 def _more(live: LiveSnapshot, bound: Bound) -> str:

@@ -45,7 +45,7 @@ is.
 
     def show(self, live: LiveSnapshot) -> None:
         """Draw every compass that reports."""
-        self.draw_data(Compasses(live.compasses, live.guidance.early))
+        self.draw_data(Compasses(live.compasses, live.early))
 
     def picture(self, data: Compasses, width: int, height: int) -> Content:  # noqa: ARG002
         """A line a compass."""

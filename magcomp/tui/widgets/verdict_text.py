@@ -110,10 +110,10 @@ def _evidence(result: CompassResult) -> Iterator[Content]:
     yield _row("full turn", f"{100 * covered.heading:.0f} %")
     yield _row("directions", f"{100 * covered.sphere:.0f} %")
     yield _row("tilt, time", f"{covered.tilt_deg:.0f}°, {covered.seconds:.0f} s")
-    yield Content.styled("Line and lags", "bold")
+    yield Content.styled("How straight, how late", "bold")
     if fit.line is not None:
         length = float(np.ptp(fit.line.positions))
-        yield _row("straight to", f"{fit.line.rms:.2f} in {length:.0f} mGauss")
+        yield _row("off a line", f"{fit.line.rms:.2f} of {length:.0f} mGauss")
     lags = (fit.lags.field, fit.lags_std.field), (fit.lags.regressor, fit.lags_std.regressor)
     yield _row("attitude", f"{words.milliseconds(*lags[0])} ms")
     yield _row(fit.regressor, f"{words.milliseconds(*lags[1])} ms")
