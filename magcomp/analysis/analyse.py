@@ -23,7 +23,7 @@ from magcomp.align.orientation import orientation_complaint
 from magcomp.analysis.by_evidence import motors_where_better
 from magcomp.analysis.choose import with_speed_controllers
 from magcomp.analysis.compare import Judged, beaten, better
-from magcomp.analysis.emit import Emission, emit
+from magcomp.analysis.emit import Emission, emit, what_applies
 from magcomp.analysis.forms import compared, forms_notes
 from magcomp.analysis.motor_by_motor import Answer, as_written
 from magcomp.analysis.multiplied import kinds_to_try, why_only_to_look_at
@@ -309,7 +309,12 @@ def _one(
         samples = problem.sample(problem.usual_lags())
         if turned := orientation_complaint(recording, samples, earth):
             complaints = (turned, *complaints)
-        found, verdict = judge(problem, fit(problem, wanted.method), complaints=complaints)
+        found, verdict = judge(
+            problem,
+            fit(problem, wanted.method),
+            complaints=complaints,
+            applied=what_applies(recording, problem.control.kind),
+        )
     require_finite(compass, (found.covariance, pack(found.correction), *_bounds(verdict)))
     return Judged(problem, found, _in_words_of(recording, verdict))
 

@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from magcomp import __version__, autopilots
-from magcomp.autopilots import Autopilot, Kind
+from magcomp.autopilots import Autopilot, Kind, Leeway
+from magcomp.fit import likely_beside
+from magcomp.judge import turning
 from magcomp.model import (
     Analysis,
     CompassResult,
+    Correction,
     Grade,
     MotorFit,
     ParameterSet,
     Recording,
-    quantity_of,
 )
-
-_IDLE_SHARE = 0.1
 
 
 @dataclass(frozen=True)
@@ -56,13 +54,12 @@ def emit(recording: Recording, fits: Sequence[MotorFit]) -> Mapping[int, Emissio
     fitted = [fit.compass for fit in fits]
     changed = not all(fit.kept for fit in fits)
     regressor = fits[0].regressor
-    usual = _usual(recording, regressor)
     switch = autopilot.switch_parameters(regressor, fitted, values, battery=recording.battery)
     return {
         fit.compass: Emission(
             accepted={
                 **(switch if changed else {}),
-                **_of_correction(autopilot, fit, values, usual, in_force=not changed),
+                **_of_correction(autopilot, fit, values, in_force=not changed),
             },
             left_out=autopilot.neutral_parameters(fit.compass, fit.regressor, values),
         )
@@ -70,31 +67,51 @@ def emit(recording: Recording, fits: Sequence[MotorFit]) -> Mapping[int, Emissio
     }
 
 
-def _usual(recording: Recording, regressor: str) -> float:
-    """The control quantity in ordinary flight: the median of what is above a tenth of the top."""
-    series = quantity_of(regressor).of(current=recording.current, throttle=recording.throttle)
-    if series is None or not len(series):
-        return 0.0
-    working = series.value > _IDLE_SHARE * float(np.max(series.value))
-    return float(np.median(series.value[working])) if working.any() else 0.0
+def what_applies(recording: Recording, kind: str) -> Callable[[MotorFit], Correction] | None:
+    """What the vehicle will apply once the parameters of a fit are written to it.
+
+    Parameters
+    ----------
+    recording
+        Of the vehicle.
+    kind
+        The control quantity that is fitted.
+
+    Returns
+    -------
+    callable
+        None where that is the fit itself.
+    """
+    autopilot, values = autopilots.of(recording), recording.parameters.latest
+    if autopilot.takes_over_all or kind not in autopilot.multiplied(recording.vehicle):
+        return None
+
+    def applied(fit: MotorFit) -> Correction:
+        made = _of_correction(autopilot, fit, values, in_force=False)
+        switch = autopilot.switch_parameters(
+            kind, (fit.compass,), values, battery=recording.battery
+        )
+        return autopilot.in_force({**values, **switch, **made}, fit.compass).correction
+
+    return applied
 
 
 def _of_correction(
     autopilot: Autopilot,
     fit: MotorFit,
     values: Mapping[str, float],
-    usual: float,
     *,
     in_force: bool,
 ) -> dict[str, float]:
     """A correction's parameters; those of one that stays keep their stored values to the bit."""
+    present = autopilot.in_force(values, fit.compass).correction
     made = autopilot.correction_parameters(
         fit.correction,
         fit.compass,
         values,
         regressor=fit.regressor,
         soft_iron_fitted="diagonal" in fit.free and not fit.kept,
-        usual=usual,
+        leeway=Leeway(likely_beside(fit, present), turning(fit)),
     )
     if not fit.kept:
         return made

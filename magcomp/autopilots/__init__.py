@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from magcomp.autopilots.ardupilot import ArduPilot
 from magcomp.autopilots.protocol import Autopilot
 from magcomp.autopilots.px4 import Px4
-from magcomp.autopilots.terms import Kind, ParameterName
+from magcomp.autopilots.terms import Kind, Leeway, ParameterName
 from magcomp.errors import MissingDataError
 from magcomp.model import Recording, Vehicle
 
@@ -72,6 +72,7 @@ __all__ = [
     "TITLES",
     "Autopilot",
     "Kind",
+    "Leeway",
     "ParameterName",
     "integer_type",
     "named",

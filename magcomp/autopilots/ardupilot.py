@@ -44,6 +44,7 @@ from magcomp.autopilots.terms import (
     Kind,
     LagPrior,
     LagPriors,
+    Leeway,
     MotorLaw,
     MotorOutputs,
     ParameterName,
@@ -99,6 +100,7 @@ class ArduPilot:
     log_folder = "APM/LOGS"
     kept_names = KEPT
     batteries = (0,)
+    takes_over_all = True
     first_slot_leads = True
     first_compass_message = "RAW_IMU"
     offset_decimals = 2
@@ -250,12 +252,22 @@ class ArduPilot:
         *,
         regressor: str,  # noqa: ARG002
         soft_iron_fitted: bool,
-        usual: float = 0.0,  # noqa: ARG002
+        leeway: Leeway,  # noqa: ARG002
     ) -> dict[str, float]:
         """COMPASS_OFS, DIA, ODI and MOT; COMPASS_SCALE stays as it is.
 
         A motor vector alone where nothing is known of the vehicle: its offsets are unknown then.
         """
+        return self._of_correction(correction, compass, values, soft_iron_fitted=soft_iron_fitted)
+
+    @staticmethod
+    def _of_correction(
+        correction: Correction,
+        compass: int,
+        values: Mapping[str, float],
+        *,
+        soft_iron_fitted: bool,
+    ) -> dict[str, float]:
         made = correction_parameters(correction, compass, scale_in_force(values, compass))
         if not values:
             return {name: value for name, value in made.items() if _is(name, Kind.MOTOR)}
@@ -282,9 +294,7 @@ class ArduPilot:
         soft_iron_fitted: bool,
     ) -> dict[str, float]:
         """COMPASS_PMOT in the place of COMPASS_MOT, which the firmware then ignores."""
-        made = self.correction_parameters(
-            correction, compass, values, regressor=CURRENT, soft_iron_fitted=soft_iron_fitted
-        )
+        made = self._of_correction(correction, compass, values, soft_iron_fitted=soft_iron_fitted)
         rest = {name: value for name, value in made.items() if not _is(name, Kind.MOTOR)}
         return rest | ardupilot_per_motor.parameters(correction.motor, exponent)
 

@@ -14,6 +14,7 @@ from magcomp.autopilots.motor_test import MotorTest
 from magcomp.autopilots.terms import (
     FieldMeaning,
     LagPriors,
+    Leeway,
     MotorLaw,
     MotorOutputs,
     ParameterName,
@@ -90,6 +91,11 @@ class Autopilot(Protocol):
     @property
     def batteries(self) -> tuple[int, ...]:
         """Battery instances whose current the firmware can multiply."""
+        ...
+
+    @property
+    def takes_over_all(self) -> bool:
+        """Whether every value that is written comes into force, however little it changes."""
         ...
 
     @property
@@ -273,7 +279,7 @@ class Autopilot(Protocol):
         *,
         regressor: str,
         soft_iron_fitted: bool,
-        usual: float = 0.0,
+        leeway: Leeway,
     ) -> dict[str, float]:
         """Parameters that make this vehicle apply a correction.
 
@@ -285,9 +291,8 @@ class Autopilot(Protocol):
             The control quantity that the motor vector is multiplied by.
         soft_iron_fitted
             The soft iron is not the one in force, so it belongs to the offsets.
-        usual
-            The control quantity in ordinary flight; 0 where unknown. Where a firmware cannot take
-            a value over as it is, the field is right here.
+        leeway
+            What to do where the firmware cannot take a value over as it is.
         """
         ...
 

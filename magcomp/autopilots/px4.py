@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from bisect import bisect_right
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -14,14 +13,11 @@ from magcomp.autopilots.motor_test import Px4MotorTest
 from magcomp.autopilots.px4_correction import (
     MGAUSS,
     REGRESSOR_OF,
-    Calibration,
     Compensation,
     after_start,
-    behind,
     compensation_of,
     in_force,
     offset_zone,
-    sensor_calibration,
     stored,
     stretches,
     unseen,
@@ -42,6 +38,7 @@ from magcomp.autopilots.terms import (
     FieldMeaning,
     LagPrior,
     LagPriors,
+    Leeway,
     MotorLaw,
     MotorOutputs,
     ParameterName,
@@ -59,7 +56,6 @@ from magcomp.model import (
     Recording,
     Series,
     Vehicle,
-    quantity_of,
 )
 
 FIRST_VERSION = (1, 12)
@@ -67,8 +63,6 @@ FIRST_VERSION = (1, 12)
 
 _THRUST_CURVE = "THR_MDL_FAC"
 _LOW, _HIGH = 1000.0, 2000.0
-_LEAST_USUAL = {CURRENT: 1.0, THROTTLE: 0.05}
-"""With less in ordinary flight COMP cannot make up for anything."""
 _LOGGED = LagPriors(LagPrior(0.0, 0.05), LagPrior(0.0, 0.1))
 """A log stamps a reading with the moment of measurement."""
 _LINK = LagPriors(LagPrior(0.0, 0.1), LagPrior(0.0, 0.1))
@@ -113,6 +107,7 @@ class Px4:
     log_folder = "log"
     kept_names = KEPT
     batteries = (0, 1)
+    takes_over_all = False
     first_slot_leads = False
     first_compass_message = "SCALED_IMU"
     offset_decimals = 4
@@ -244,19 +239,18 @@ class Px4:
         *,
         regressor: str,
         soft_iron_fitted: bool,
-        usual: float = 0.0,
+        leeway: Leeway,
     ) -> dict[str, float]:
         """COMP and OFF, and SCALE and ODIAG where fitted, such that the firmware notices them."""
-        rotation = sensor_to_body(values, compass)
-        present = after_start(values, compass)
-        wanted = sensor_calibration(correction, rotation, compensation_of(regressor, 0))
-        if not soft_iron_fitted:
-            wanted = _with_shape(wanted, present)
-        made = noticed(wanted, present, offset_zone(values), rotation)
-        if usual >= _LEAST_USUAL[regressor]:
-            power = usual if quantity_of(regressor).is_throttle else usual / MGAUSS
-            missed = (made.offset - wanted.offset) / power
-            made = replace(made, motor=made.motor + missed)
+        made = noticed(
+            correction,
+            after_start(values, compass),
+            sensor_to_body(values, compass),
+            offset_zone(values),
+            leeway,
+            compensation=compensation_of(regressor, 0),
+            soft_iron_too=soft_iron_fitted,
+        )
         found = _vector("COMP", compass, made.motor) | _vector("OFF", compass, made.offset)
         if soft_iron_fitted:
             found |= _vector("SCALE", compass, made.scale)
@@ -369,9 +363,3 @@ def _vector(kind: str, compass: int, vector: FloatArray) -> dict[str, float]:
         name: float(np.float32(value))
         for name, value in zip(vector_names(kind, compass), vector, strict=True)
     }
-
-
-def _with_shape(wanted: Calibration, present: Calibration) -> Calibration:
-    """The same motor vector behind the soft iron that is in force."""
-    shaped = replace(wanted, scale=present.scale, off_diagonal=present.off_diagonal)
-    return replace(shaped, motor=behind(shaped, wanted.soft_iron @ wanted.motor))

@@ -277,11 +277,6 @@ def sensor_calibration(
     )
 
 
-def behind(calibration: Calibration, motor: FloatArray) -> FloatArray:
-    """COMP, shape (3,), that does to the field behind a soft iron what ``motor`` says, (3,)."""
-    return np.asarray(np.linalg.solve(calibration.soft_iron, motor))
-
-
 def in_force(
     calibration: Calibration, rotation: FloatArray, missing: tuple[str, ...] = ()
 ) -> InForce:

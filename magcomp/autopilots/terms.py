@@ -7,7 +7,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from magcomp.model import FloatArray
+from magcomp.model import Correction, FloatArray
 
 
 class Kind(IntEnum):
@@ -161,3 +161,22 @@ class MotorLaw:
 
     numbers: tuple[int, ...]
     most_exponent: float
+
+
+@dataclass(frozen=True, eq=False)
+class Leeway:
+    """How a firmware that cannot take a correction over as it is should miss it.
+
+    Attributes
+    ----------
+    likely
+        What to come near then: the most probable correction where the calibration in force may
+        well be right.
+    turning
+        What it costs: a deviation d of the 12 parameters of :func:`magcomp.model.pack` turns the
+        heading by d · turning · d, mean square in radians² over all headings and the control
+        quantities flown, shape (12, 12).
+    """
+
+    likely: Correction
+    turning: FloatArray

@@ -9,6 +9,7 @@ from magcomp.fit.auto import (
     refit,
     require_readings,
 )
+from magcomp.fit.beside import likely_beside
 from magcomp.fit.ellipsoid import Ellipsoids, fit_ellipsoid, fit_ellipsoids
 from magcomp.fit.flight import Problem
 from magcomp.fit.folds import folds
@@ -32,6 +33,7 @@ __all__ = [
     "fit_ellipsoids",
     "folds",
     "is_still",
+    "likely_beside",
     "line_through",
     "orthogonal_line",
     "paper_line",

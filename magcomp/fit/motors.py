@@ -14,6 +14,7 @@ import numpy as np
 
 from magcomp.fit.field_model import SIZE
 from magcomp.fit.robust import Estimate
+from magcomp.fit.widths import weights_of
 from magcomp.model import MOTOR, FloatArray
 
 _WIDTHS = np.concatenate([[0.0], np.geomspace(0.01, 100.0, 41)])
@@ -104,16 +105,10 @@ def alike_where_unseen(found: Found, stretch: FloatArray, unsure: float = 0.0) -
         return found
     gain_of = found.covariance @ tell.T
     identity = np.eye(len(apart))
-    density, moves, gains = [], [], []
-    for width in _WIDTHS * usual:
-        whole = doubt + (width**2 + _SMALL * usual**2) * identity
-        gain = np.linalg.solve(whole, gain_of.T).T
-        moves.append(gain @ apart)
-        gains.append(gain @ gain_of.T)
-        density.append(-0.5 * float(apart @ np.linalg.solve(whole, apart)))
-        density[-1] -= 0.5 * float(np.linalg.slogdet(whole)[1])
-    weights = np.exp(np.array(density) - max(density))
-    weights /= weights.sum()
+    spreads = [doubt + (w**2 + _SMALL) * usual**2 * identity for w in _WIDTHS]
+    pulls = [np.linalg.solve(each, gain_of.T).T for each in spreads]
+    moves, gains = [pull @ apart for pull in pulls], [pull @ gain_of.T for pull in pulls]
+    weights = weights_of(apart, spreads)
     move = weights @ np.array(moves)
     off = np.array(moves) - move
     covariance = found.covariance - np.tensordot(weights, np.array(gains), 1)

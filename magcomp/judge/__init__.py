@@ -1,7 +1,7 @@
 """MotorFit → Verdict: held-out proof, uncertainty in degrees, and reasons a pilot understands."""
 
 from magcomp.judge.evidence import field_residual
-from magcomp.judge.heading_error import heading_errors, largest_shift
+from magcomp.judge.heading_error import heading_errors, largest_shift, turning
 from magcomp.judge.judge import judge
 from magcomp.judge.present import judge_present
 from magcomp.judge.thresholds import Thresholds
@@ -13,4 +13,5 @@ __all__ = [
     "judge",
     "judge_present",
     "largest_shift",
+    "turning",
 ]

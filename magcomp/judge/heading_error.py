@@ -30,6 +30,7 @@ TILT_RAD = np.radians(20.0)
 
 _YAWS = np.radians(np.arange(0.0, 360.0, 10.0))
 _DRAWS = 400
+_TURNING_STEPS = 5
 
 
 def attitudes() -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -99,7 +100,7 @@ def heading_errors(
     present_u: FloatArray,
     rng: np.random.Generator,
     *,
-    keep: bool = False,
+    applied: Correction | None = None,
 ) -> tuple[HeadingError, ...]:
     """Largest heading error over all yaws, level and tilted, by control quantity.
 
@@ -114,8 +115,9 @@ def heading_errors(
         :func:`control_grid`, shape (k,).
     rng
         For the draws from the covariance.
-    keep
-        ``after`` and ``p95`` of ``present``, which is left as it is, instead of the fit.
+    applied
+        ``after`` and ``p95`` of this correction, where something else than the fit will correct:
+        the one in force where it is left as it is, or what a firmware makes of the fit.
 
     Notes
     -----
@@ -132,7 +134,10 @@ def heading_errors(
         before = present.apply(raw, np.full(len(raw), u_present))
         slopes = _shift_slopes(field, raw + fit.correction.offset, roll, pitch, u, fit)
         off = shifts(before, field, roll, pitch)
-        largest = np.abs(draws @ slopes.T + (off if keep else 0.0)).max(axis=1)
+        beside = np.zeros(len(raw))
+        if applied is not None:
+            beside = shifts(applied.apply(raw, np.full(len(raw), u)), field, roll, pitch)
+        largest = np.abs(draws @ slopes.T + beside).max(axis=1)
         rows.append(
             HeadingError(
                 u=float(u),
@@ -142,6 +147,28 @@ def heading_errors(
             )
         )
     return tuple(rows)
+
+
+def turning(fit: MotorFit) -> FloatArray:
+    """What deviations of the 12 parameters cost over the control quantities flown.
+
+    Returns
+    -------
+    ndarray, shape (12, 12)
+        A deviation d turns the heading by d · turning · d, mean square, radians², over all yaws,
+        level and tilted, from no control quantity to the largest flown (at least the first step
+        of :func:`control_grid`).
+    """
+    roll, pitch, yaw = attitudes()
+    field = _field_at(fit, roll, pitch, yaw)
+    inverse = np.linalg.inv(fit.correction.soft_iron).T
+    found = np.zeros((CORRECTION_SIZE, CORRECTION_SIZE))
+    steps = np.linspace(0.0, max(fit.u_high, float(control_grid(fit)[1])), _TURNING_STEPS)
+    for u in steps.tolist():
+        centred = (field - u * fit.correction.vector) @ inverse
+        slopes = _shift_slopes(field, centred, roll, pitch, u, fit)
+        found += slopes.T @ slopes
+    return found / (len(field) * len(steps))
 
 
 def _root(covariance: FloatArray) -> FloatArray:

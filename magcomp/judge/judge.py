@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 
@@ -27,6 +27,7 @@ from magcomp.model import (
     CORRECTION_SIZE,
     MOTOR,
     OFFSET,
+    Correction,
     Coverage,
     FieldResidual,
     FloatArray,
@@ -60,6 +61,7 @@ def judge(
     thresholds: Thresholds | None = None,
     rng: np.random.Generator | None = None,
     complaints: tuple[str, ...] = (),
+    applied: Callable[[MotorFit], Correction] | None = None,
 ) -> tuple[MotorFit, Verdict]:
     """Judge a fit on data it did not see.
 
@@ -74,6 +76,8 @@ def judge(
         always gets the same answer.
     complaints
         What is wrong with the sensors, in words: any of them rejects.
+    applied
+        What a firmware makes of a fit that it cannot take over as it is; None where it can.
 
     Returns
     -------
@@ -99,8 +103,10 @@ def judge(
     alike = in_force.regressor in (None, fit.regressor) and problem.control.parts == 1
     stays = alike and is_close(fit, in_force.correction, errors)
     if stays:
-        errors = table(rng, keep=True)
+        errors = table(rng, applied=in_force.correction)
         residual = replace(residual, after=residual.before, held_out=residual.held_out_before)
+    elif applied is not None:
+        errors = table(rng, applied=applied(fit))
     covered = cover(samples, fit.correction.apply(samples.raw, samples.u))
     findings = [
         *(Finding(Grade.REJECTED, complaint) for complaint in complaints),

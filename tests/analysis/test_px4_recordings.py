@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import px4_truth
 import pytest
 from truth import FIXTURES
 
 from magcomp.analysis import Options, analyse, parameter_set
+from magcomp.analysis.emit import what_applies
 from magcomp.errors import MissingDataError
+from magcomp.judge import heading_errors
+from magcomp.judge.judge import DEFAULT_SEED
 from magcomp.model import CURRENT, THROTTLE
 from magcomp.sources import read
 
@@ -42,6 +46,20 @@ def test_a_wrong_compensation_in_force_is_replaced_by_the_right_one() -> None:
     assert before > 30.0
     assert after < 1.0
     assert analysis.compasses[0].verdict.heading_error[-1].p95 > after
+
+    result = analysis.compasses[0]
+    applied = what_applies(recording, CURRENT)
+    assert applied is not None
+    firmware = applied(result.fit)
+    in_force = px4_truth.through_dead_zones(px4_truth.AT_START, {**stored, **emitted}, compass - 1)
+    assert np.allclose(firmware.offset, -1000.0 * sensor.rotation @ in_force["OFF"], atol=1e-3)
+    # The bound is that of what the firmware will do, not of the fit that it cannot take over.
+    rng, zeros = np.random.default_rng(DEFAULT_SEED), np.zeros(6)
+    told = [row.p95 for row in result.verdict.heading_error]
+    of_fit = heading_errors(result.fit, firmware, zeros, rng)
+    of_firmware = heading_errors(result.fit, firmware, zeros, rng, applied=firmware)
+    assert told == pytest.approx([row.p95 for row in of_firmware], rel=1e-9)
+    assert told != pytest.approx([row.p95 for row in of_fit], rel=1e-3)
 
 
 def analysed(path: Path) -> dict[int, float]:

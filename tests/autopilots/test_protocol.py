@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from magcomp import autopilots
-from magcomp.autopilots import Autopilot, Kind
+from magcomp.autopilots import Autopilot, Kind, Leeway
 from magcomp.autopilots.ardupilot import ArduPilot, vector_parameters
 from magcomp.autopilots.ardupilot_names import ACTING, acting_on
 from magcomp.errors import MissingDataError, ParameterFileError
@@ -75,7 +75,12 @@ def test_what_is_written_for_a_correction_is_what_comes_into_force(
     values = held()
     values |= ARDUPILOT.switch_parameters(regressor, [compass], values)
     values |= ARDUPILOT.correction_parameters(
-        correction, compass, values, regressor=regressor, soft_iron_fitted=True
+        correction,
+        compass,
+        values,
+        regressor=regressor,
+        soft_iron_fitted=True,
+        leeway=Leeway(correction, np.eye(12)),
     )
     in_force = ARDUPILOT.in_force(values, compass)
     assert in_force.regressor == regressor

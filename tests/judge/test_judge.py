@@ -14,7 +14,14 @@ from magcomp.autopilots import ardupilot
 from magcomp.errors import MissingDataError
 from magcomp.fit import fit, folds
 from magcomp.geometry import body_from_earth, heading, wrap_angle
-from magcomp.judge import evidence, heading_errors, judge, judge_present, largest_shift
+from magcomp.judge import (
+    evidence,
+    heading_errors,
+    judge,
+    judge_present,
+    largest_shift,
+    turning,
+)
 from magcomp.judge.heading_error import attitudes
 from magcomp.judge.present import _error as error_of_level
 from magcomp.model import (
@@ -174,6 +181,45 @@ def test_the_error_before_is_the_error_of_what_was_in_force_against_the_fit():
     horizontal = np.sqrt(found.strength**2 - found.vertical**2)
     least = np.degrees(np.arcsin(50.0 * np.linalg.norm(found.interference[:2]) / horizontal))
     assert growth[-1] >= least - 0.5
+
+
+def test_what_a_firmware_makes_of_a_fit_is_in_the_bound():
+    """Sure of the fit, the bound is how far from it the vehicle will correct."""
+    problem = Flown(seed=1, seconds=60.0).problem()
+    found = fit(problem, "flight")
+    sure = replace(found, covariance=np.zeros((CORRECTION_SIZE,) * 2))
+    missed = replace(found.correction, offset=found.correction.offset + np.array([3.0, 0.0, 0.0]))
+    grid = np.arange(0.0, 60.0, 10.0)
+    rows = heading_errors(sure, found.correction, grid, np.random.default_rng(1), applied=missed)
+    horizontal = np.sqrt(found.strength**2 - found.vertical**2)
+    by_hand = np.degrees(
+        np.linalg.norm((found.correction.soft_iron @ [3.0, 0, 0])[:2]) / horizontal
+    )
+    for row in rows:
+        assert row.before == pytest.approx(0.0, abs=1e-6)
+        assert row.after == row.p95 == pytest.approx(by_hand, rel=0.25)
+
+    far = replace(found.correction, offset=found.correction.offset + np.array([40.0, 0.0, 0.0]))
+    _, as_fitted = judge(problem, found)
+    _, as_applied = judge(problem, found, applied=lambda _: far)
+    assert as_fitted.grade is Grade.GOOD
+    assert as_applied.grade is not Grade.GOOD
+    assert all(row.p95 > 5.0 for row in as_applied.heading_error)
+
+
+def test_what_a_miss_costs_is_the_mean_square_of_what_it_turns():
+    found = fit(Flown(seed=1, seconds=60.0).problem(), "flight")
+    step = np.array([0.01, -0.02, 0.01, 0.5, 0.3, -0.4, *[1e-3, -1e-3, 5e-4, 3e-4, 1e-4, -2e-4]])
+    level = np.sqrt(found.strength**2 - found.vertical**2)
+    roll, pitch, yaw = attitudes()
+    field = body_from_earth(roll, pitch, yaw) @ np.array([level, 0.0, found.vertical])
+    turned = []
+    for u in np.linspace(0.0, found.u_high, 5):
+        raw = found.correction.undo(field, np.full(len(field), u))
+        other = unpack(pack(found.correction) + step).apply(raw, np.full(len(field), u))
+        turned.append(wrap_angle(heading(other, roll, pitch) - heading(field, roll, pitch)))
+    by_hand = float(np.mean(np.square(turned)))
+    assert float(step @ turning(found) @ step) == pytest.approx(by_hand, rel=0.02)
 
 
 def test_nineteen_of_twenty_corrections_that_the_doubt_allows_are_within_the_bound():
