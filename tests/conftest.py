@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 import tempfile
@@ -13,6 +14,9 @@ from hypothesis import settings
 # The matrices of a fit are small: more threads only wait for each other. Set before numpy is
 # loaded; programs that tests start inherit it.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+# An app is drawn when it has something new to show; sixty times a second is for eyes.
+os.environ.setdefault("TEXTUAL_FPS", "12")
 
 # What is printed has Unicode in it, whatever the locale of the machine that tests.
 os.environ["LC_ALL"] = "C.UTF-8"
@@ -35,6 +39,17 @@ def pytest_configure(config: pytest.Config) -> None:
         folder = tempfile.TemporaryDirectory(prefix="magcomp-tests-")
         config.add_cleanup(folder.cleanup)
         os.environ["MAGCOMP_TESTS_ONCE"] = folder.name
+
+
+def pytest_sessionstart() -> None:
+    """Let nothing be looked through while the tests are found: none of it is garbage."""
+    gc.disable()
+
+
+def pytest_collection_finish() -> None:
+    """Look for garbage again, but not among thousands of tests, which live to the end."""
+    gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture

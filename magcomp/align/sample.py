@@ -58,7 +58,7 @@ def sample(
     )
     later = lags.regressor + readings.applied_later if lags.applied is None else lags.applied
     applied = readings.time - later
-    raw, raw_rate = _undo(readings, in_force, applied)
+    raw, raw_rate, raw_pull = _undo(readings, in_force, applied)
     u = _columns(interpolate(control.series, commanded))
     return Samples(
         compass=readings.compass,
@@ -66,6 +66,7 @@ def sample(
         time=readings.time,
         raw=raw,
         raw_rate=raw_rate,
+        raw_pull=raw_pull,
         present=_as_now(readings, raw, in_force, applied),
         attitude=attitude,
         down=gravity_direction(attitude[:, 0], attitude[:, 1]),
@@ -88,15 +89,16 @@ def _rate(series: Series, time: FloatArray) -> FloatArray:
 
 def _undo(
     readings: Readings, controls: Mapping[str, Control], applied: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Raw field and its change per second of regressor lag, both of shape (n, 3)."""
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Raw field, its change per second of lag and that per unit of u, each of shape (n, 3)."""
+    nothing = np.zeros_like(readings.reported)
     if not readings.corrected:
-        return readings.reported, np.zeros_like(readings.reported)
+        return readings.reported, nothing, nothing
     if readings.told_offset is not None and readings.told_motor is not None:
         raw = _undo_told(readings, readings.told_offset, readings.told_motor)
-        return raw, np.zeros_like(raw)
+        return raw, nothing, nothing
     raw = np.empty_like(readings.reported)
-    raw_rate = np.zeros_like(raw)
+    raw_rate, raw_pull = np.zeros_like(raw), np.zeros_like(raw)
     for index, stretch in enumerate(readings.in_force):
         rows = readings.stretch == index
         if not rows.any():
@@ -116,8 +118,9 @@ def _undo(
             field = field - added(interpolate(series, applied[rows]))
             # The derivative of −MOT·u(t − applied) by applied is +MOT·u̇.
             raw_rate[rows] = added(_rate(series, applied[rows])) @ inverse.T
+            raw_pull[rows] = -inverse @ stretch.correction.vector
         raw[rows] = field @ inverse.T - stretch.correction.offset
-    return raw, raw_rate
+    return raw, raw_rate, raw_pull
 
 
 def _undo_told(readings: Readings, told_offset: FloatArray, told_motor: FloatArray) -> FloatArray:

@@ -53,17 +53,14 @@ def _for_motors(fit: MotorFit, samples: Samples, covered: Coverage) -> str:
     hard = covered.u_low + _HARD_SHARE * (covered.u_high - covered.u_low)
     gap = widest_gap(samples.attitude[samples.total > hard, 2])
     if gap is not None:
-        above = in_words(hard)
-        return (
-            f"headings {_named(gap)} were never seen above {above}: climb hard while facing there"
-        )
+        return f"{_unseen(gap, f' above {in_words(hard)}')}: climb hard while facing {_there(gap)}"
     return "record longer, with more climbs and descents at all headings"
 
 
 def _for_calibration(samples: Samples, covered: Coverage, shares: Mapping[str, float]) -> str:
     gap = widest_gap(samples.attitude[:, 2])
     if gap is not None:
-        return f"headings {_named(gap)} were never seen: turn slowly all the way round"
+        return f"{_unseen(gap)}: turn slowly all the way round"
     if covered.tilt_deg < _LEANS_ENOUGH_DEG:
         return (
             f"the vehicle never leaned more than {covered.tilt_deg:.0f}°: fly fast legs, "
@@ -104,6 +101,22 @@ def widest_gap(yaw: FloatArray) -> tuple[float, float] | None:
     return float(first * width), float(first * width + empty[widest] * width)
 
 
-def _named(gap: tuple[float, float]) -> str:
+def _unseen(gap: tuple[float, float], where: str = "") -> str:
+    """In words which headings are missing, or which there are where those are fewer."""
+    first, last = gap
+    if not _is_most(gap):
+        return f"headings {_named(first, last)} were never seen{where}"
+    return f"only headings {_named(last, first)} were seen{where}"
+
+
+def _there(gap: tuple[float, float]) -> str:
+    return "other ways" if _is_most(gap) else "there"
+
+
+def _is_most(gap: tuple[float, float]) -> bool:
+    return 180.0 < gap[1] - gap[0] < 360.0
+
+
+def _named(first: float, last: float) -> str:
     """In words: 350° to 70°."""
-    return f"{gap[0]:.0f}° to {gap[1] if gap[1] <= 360.0 else gap[1] - 360.0:.0f}°"
+    return f"{first % 360.0:.0f}° to {last if last <= 360.0 else last - 360.0:.0f}°"

@@ -234,10 +234,13 @@ def test_record_leaves_a_log_that_can_be_read(tmp_path, capsys):
 def test_calibrate_guides_ends_when_the_pilot_disarms_fits_and_writes(
     tmp_path, data_directory, capsys, monkeypatch
 ):
-    monkeypatch.setattr(LiveSession, "open", partial(LiveSession.open, rates=RATES))
+    # Without refits there is never enough: it is the pilot who ends it, on any computer.
+    unfitted = partial(LiveSession.open, rates=RATES, refit_share=0.0)
+    monkeypatch.setattr(LiveSession, "open", unfitted)
     answer, log = tmp_path / "a.param", tmp_path / "a.tlog"
     with alive("sweep", speed=20.0) as flown:
-        options = ("-o", answer, "--record", log, "--system", 1, "--upload", "--yes")
+        options = ("-o", answer, "--record", log, "--system", 1, "--regressor", "current")
+        options = (*options, "--upload", "--yes")
         assert magcomp("calibrate", flown.address, *options) == ExitCode.GOOD
         found = read_parameter_file(answer).values
         assert all(flown.vehicle.parameters[name] == value for name, value in found.items())
@@ -279,8 +282,10 @@ def test_a_log_is_calibrated_as_if_it_were_flown_now(tmp_path, capsys):
 def test_ctrl_c_keeps_what_was_recorded_and_goes_on_to_the_fit(tmp_path):
     log = tmp_path / "a.tlog"
     with alive("sweep", speed=16.0) as flown:
+        # For a flight this is never enough, so that it goes on until it is interrupted.
+        options = ("--system", "1", "--record", str(log), "--manoeuvre", "flight", "--json")
         child = subprocess.Popen(
-            [*MAGCOMP, "calibrate", flown.address, "--system", "1", "--record", str(log), "--json"],
+            [*MAGCOMP, "calibrate", flown.address, *options],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
         )

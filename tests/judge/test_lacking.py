@@ -90,6 +90,14 @@ def test_headings_never_seen_at_all_are_named(flown, part):
 
 
 @pytest.mark.parametrize("part", [OFFSET, SOFT_IRON])
+def test_where_most_headings_are_missing_those_that_were_seen_are_named(flown, part):
+    found, samples = flown
+    yaw = np.mod(np.degrees(samples.attitude[:, 2]), 360.0)
+    text = said(unsure_of(found, part), samples.where((yaw < 60.0) | (yaw > 340.0)))
+    assert text.startswith("only headings 340° to 60° were seen: turn")
+
+
+@pytest.mark.parametrize("part", [OFFSET, SOFT_IRON])
 def test_a_vehicle_that_hardly_leaned_is_told_to(flown, part):
     found, samples = flown
     level = replace(samples, down=np.tile([0.0, 0.0, 1.0], (len(samples.down), 1)))

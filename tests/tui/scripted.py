@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import made
+from textual.strip import Strip
 
 from magcomp.errors import LinkError
 from magcomp.live.situation import Manoeuvre
@@ -188,29 +189,28 @@ async def until(
 
 
 async def steady(pilot: Any) -> None:
-    """Let the app work until nothing waits to be laid out or drawn, and the screen stays.
+    """Let the app work until nothing waits to be laid out or drawn, and the picture stays.
 
     However busy the machine is: what counts is that no message is on its way, not that the
     process has been quiet for a moment.
     """
-    seen: list[str] = []
-    while len(seen) < 3 or len(set(seen[-3:])) > 1:
+    seen: list[list[Strip]] = []
+    while len(seen) < 3 or any(each != seen[-1] for each in seen[-3:]):
         await pilot.pause()
         if _waits(pilot.app):
             seen.clear()
         else:
-            seen.append(picture(pilot.app))
+            seen.append(pilot.app.screen._compositor.render_strips())
 
 
 def _waits(app: MagcompApp) -> bool:
-    """Whether a message, a layout or a part of the screen is still to be dealt with."""
-    on_screen = app.screen
-    nodes = (app, *on_screen.walk_children(with_self=True))
+    """Whether a message, a layout or a part of a screen, seen behind another or not, waits."""
+    screens = app.screen_stack
+    nodes = [app, *(node for each in screens for node in each.walk_children(with_self=True))]
     return bool(
-        on_screen._layout_required
-        or on_screen._layout_widgets
-        or on_screen._dirty_widgets
-        or app.workers._workers
+        app.workers._workers
+        or any(each._layout_required or each._layout_widgets for each in screens)
+        or app.screen._dirty_widgets
         or any(node._message_queue is None or node._message_queue.qsize() for node in nodes)
     )
 

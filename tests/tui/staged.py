@@ -9,7 +9,7 @@ from typing import Any
 
 import made
 import scripted
-from scripted import ScriptedSession, until
+from scripted import ScriptedSession, steady, until
 
 from magcomp.analysis import Options
 from magcomp.live.situation import Situation
@@ -166,6 +166,7 @@ async def verify_measured(pilot: Any) -> None:
 
 async def trouble(pilot: Any) -> None:
     await fit_heading(pilot)
+    await steady(pilot)  # what lies behind a dialog stays as it was drawn last
     message = Message(
         "That did not work",
         "made.tlog must hold a throttle that changes; instead it holds only current.",
@@ -177,6 +178,7 @@ async def trouble(pilot: Any) -> None:
 
 async def help_for_fit(pilot: Any) -> None:
     await fit_heading(pilot)
+    await steady(pilot)
     await pilot.press("f1")
 
 

@@ -32,7 +32,7 @@ async def tap(pilot, key: str) -> None:
 @pytest.fixture(autouse=True)
 def _little_to_do(monkeypatch):
     """A busy computer has to simulate, receive, fit and draw at once: less of each will do."""
-    slower = partial(LiveSession.open, rates=live_vehicle.RATES)
+    slower = partial(LiveSession.open, rates=live_vehicle.RATES, refit_share=0.0)
     monkeypatch.setattr(LiveSession, "open", slower)
     monkeypatch.setattr(watcher, "EVERY_S", 0.5)
 
