@@ -32,6 +32,9 @@ from magcomp.model import (
 )
 
 _SHIFTS = np.arange(-0.2, 0.301, 0.02)
+_COARSE = 3
+"""Every so manieth shift is tried, and then those around the best: a vehicle's current has no two
+that fit so near each other."""
 _TREND_S = 5.0
 _LEAST_ROWS = 30
 POWERS = (1, 2, 3)
@@ -265,8 +268,11 @@ def _rebuilt_through(
     # Enough to find four coefficients by: of hours of current every few readings.
     few = slice(None, None, -(-len(reference) // _MOST_REGRESSED))
     told = Series(reference.time[few], reference.value[few])
-    fits = [_regress(told, seen, shift) for shift in _SHIFTS]
-    best = min(range(len(fits)), key=lambda k: fits[k][1])
+    coarse = {k: _regress(told, seen, _SHIFTS[k]) for k in range(0, len(_SHIFTS), _COARSE)}
+    near = min(coarse, key=lambda k: coarse[k][1])
+    around = range(max(near - _COARSE + 1, 0), min(near + _COARSE, len(_SHIFTS)))
+    fits = coarse | {k: _regress(told, seen, _SHIFTS[k]) for k in around if k != near}
+    best = min(fits, key=lambda k: fits[k][1])
     coefficients, cost = fits[best]
     if not cost < (1 - _LEAST_EXPLAINED) * float(np.var(reference.value)):
         return None

@@ -13,13 +13,13 @@ from textual.widgets import ProgressBar, Static
 
 from magcomp.analysis import Options
 from magcomp.fit import METHODS
-from magcomp.model import Analysis, Grade, quantity_of
+from magcomp.model import Analysis, Grade
 from magcomp.report import words
 from magcomp.report.as_json import analysis_object
 from magcomp.report.plain import pilots_lines
 from magcomp.tui.fits import fit_rows, time_range
 from magcomp.tui.messages import OptionsChosen, TimeRangeWanted
-from magcomp.tui.pictures import AXIS_WORDS, CompassPicture
+from magcomp.tui.pictures import CompassPicture
 from magcomp.tui.screens.step import StepScreen
 from magcomp.tui.widgets.fits_table import FitsTable
 from magcomp.tui.widgets.heading_table import HeadingTable
@@ -138,7 +138,7 @@ and C change method, regressor, time range and compasses, and fit again at once;
             self.call_after_refresh(self._focus_view)
         self._drawn = (shown, analysis)
         self.query_one(HeadingTable).show(shown.errors)
-        self.query_one(ShiftPlot).show(shown.shift)
+        self.query_one(ShiftPlot).show(shown.shift, shown.result.fit)
         self.query_one(UnexplainedPlot).show(shown.unexplained)
         self.query_one(VerdictText).show(shown.result, analysis.notes)
         rows = fit_rows(self.state.work.tried, analysis, self._compass)
@@ -149,10 +149,6 @@ and C change method, regressor, time range and compasses, and fit again at once;
             f"unseen {residual.held_out:.1f}"
         )
         self.query_one("#view-unexplained").border_subtitle = "x now   • corrected"
-        axes = zip(AXIS_WORDS, shown.result.fit.interference, strict=True)
-        each = "  ".join(f"{axis} {words.number(float(value))}" for axis, value in axes)
-        per = quantity_of(shown.result.fit.regressor).per
-        self.query_one("#view-shift").border_subtitle = f"{each}  {per}"
 
     def _pilots_line(self, analysis: Analysis) -> str:
         """What to do, in words without statistics."""
