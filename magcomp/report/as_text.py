@@ -14,6 +14,7 @@ from rich.rule import Rule
 from rich.text import Text
 
 from magcomp import __version__
+from magcomp.align import on_lift_alone
 from magcomp.model import (
     CURRENT,
     Analysis,
@@ -120,6 +121,8 @@ def check_text(
     parts.extend(_findings(results, ("in force", "at most (95 %)"), ("red", "yellow")))
     parts.append(Text())
     parts.append(tables.check(verdicts, kind))
+    if left_out := on_lift_alone(recording)[1]:
+        parts.append(_note(left_out))
     return render([*parts, *_not_judged(recording, verdicts, asked)], look)
 
 
