@@ -12,8 +12,9 @@ from textual.widget import Widget
 from textual.widgets import ProgressBar, Static
 
 from magcomp.analysis import Options
+from magcomp.analysis.analyse import ESC
 from magcomp.fit import METHODS
-from magcomp.model import Analysis, Grade
+from magcomp.model import CURRENT, MOTORS, THROTTLE, Analysis, Grade, Recording
 from magcomp.report import words
 from magcomp.report.as_json import analysis_object
 from magcomp.report.plain import pilots_lines
@@ -39,7 +40,18 @@ _OPTION_KEYS = ("fit.method", "fit.regressor", "fit.compasses", "fit.time")
 
 _T = TypeVar("_T")
 
-REGRESSORS = ("auto", "current", "throttle")
+
+def regressors(recording: Recording | None) -> tuple[str, ...]:
+    """Control quantities that a recording may be fitted by, in the order in which R offers them.
+
+    Where what is needed for one of them is there; whether it tells the motors apart, the fit says.
+    """
+    offered = ["auto", CURRENT, THROTTLE]
+    if recording is not None and recording.current is not None and recording.outputs is not None:
+        offered.append(MOTORS)
+    if recording is not None and recording.esc_currents:
+        offered.append(ESC)
+    return tuple(offered)
 
 
 class FitScreen(StepScreen):
@@ -223,7 +235,9 @@ and C change method, regressor, time range and compasses, and fit again at once;
 
     def action_regressor(self) -> None:
         """Fit against the next control quantity."""
-        self._change(regressor=_after(REGRESSORS, self.state.work.options.regressor))
+        offered = regressors(self.state.work.recording)
+        # As with methods, one that cannot be fitted must not end the round.
+        self._change(regressor=_after(offered, self.state.asked.regressor))
 
     def action_compasses(self) -> None:
         """Fit all compasses, or one."""
