@@ -80,10 +80,13 @@ class Duty(NamedTuple):
         Duty 0 … 1, shape (n, k).
     numbers
         Of which motor each column is, as the firmware counts them.
+    channels
+        From which output, counted from 0.
     """
 
     series: Series
     numbers: tuple[int, ...]
+    channels: tuple[int, ...]
 
 
 def controls(recording: Recording) -> tuple[Control, ...]:
@@ -162,7 +165,12 @@ def duty_of(recording: Recording) -> Duty | None:
         return None
     numbers = motors.numbers or tuple(range(1, len(motors.channels) + 1))
     runs = _running(recording.outputs, motors)
-    return Duty(duty, tuple(n for n, does in zip(numbers, runs, strict=True) if does))
+    driven = [
+        (number, channel)
+        for number, channel, does in zip(numbers, motors.channels, runs, strict=True)
+        if does
+    ]
+    return Duty(duty, *(tuple(each) for each in zip(*driven, strict=True)))
 
 
 def _running(outputs: Series, motors: MotorOutputs) -> BoolArray:
@@ -219,8 +227,12 @@ def _best(forms: list[Rebuilt | None]) -> list[Control]:
     return [min(whole, key=lambda form: form.cost).control] if whole else []
 
 
-def rebuild(reference: Series, duty: Series, kind: str, name: str) -> Rebuilt | None:
+def rebuild(
+    reference: Series, duty: Series, kind: str, name: str, *, measured: bool = False
+) -> Rebuilt | None:
     """The reference regressed on powers of the duty, shape (n, k), sampled more often.
+
+    What is ``measured`` has noise of its own, and a smoothing of that looks like the monitor's.
 
     A battery monitor smooths what it measures. Where the duty is told often enough to show that,
     the quantity is rebuilt as it was before: more than a shift in time lies between the two, and a
@@ -237,7 +249,8 @@ def rebuild(reference: Series, duty: Series, kind: str, name: str) -> Rebuilt | 
     smoothed = [
         found
         for each in _SMOOTHINGS
-        if each > _STEPS_SEEN * step > 0.0
+        if not measured
+        and each > _STEPS_SEEN * step > 0.0
         and (found := _rebuilt_through(reference, features, each, kind, name)) is not None
     ]
     best = min(smoothed, key=lambda found: found.cost, default=plain)

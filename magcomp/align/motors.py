@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,25 +31,26 @@ _STEP_S, _MOST_ROWS = 0.1, 100_000
 
 
 def currents_of_motors(recording: Recording) -> tuple[Control, ...]:
-    """The current of each motor, from the battery's current and what drives each motor.
+    """The current of each motor, from the battery's current and what tells each motor's share.
 
     Returns
     -------
     tuple of Control
         Parts of shape (n, k), in A, that add up to the battery's current: as it is reported and as
-        the outputs tell it, with different time constants. Empty where the recording lacks the
-        current or the outputs of two motors, or the one does not follow the other.
+        what tells the shares tells it, with different time constants. Empty where the recording
+        lacks the current, or anything of every motor that the current follows.
 
     Notes
     -----
-    The battery's current is regressed on powers of all duties. Each power is a sum over the
-    motors, so each motor's share of it is its current. Between the times the outputs are told at
-    the share is what is to be expected (docs/method.md, Motor by motor).
+    Where the speed controller of every motor reports its current, that is its share. Else the
+    battery's current is regressed on powers of all duties. Each power is a sum over the motors, so
+    each motor's share of it is its current. Between the times the shares are told at they are what
+    is to be expected (docs/method.md, Motor by motor).
     """
     found = _told(recording)
     if found is None or recording.current is None:
         return ()
-    told_at, rebuilt, numbers = found
+    told_at, rebuilt, _, numbers, source = found
     time = _often(rebuilt.time)
     turns = told_at.value.sum(axis=1) > 0.5
     shares = {
@@ -56,15 +59,15 @@ def currents_of_motors(recording: Recording) -> tuple[Control, ...]:
     }
     unsure = _apart(interpolate(told_at, time), [*shares.values()][-1])
     totals = {
-        "as the outputs tell it": interpolate(rebuilt, time),
+        f"as the {source} tell it": interpolate(rebuilt, time),
         "as reported": interpolate(recording.current, time),
     }
     return tuple(
         Control(
             MOTORS,
             smoothed(Series(time, share * total[:, None]), constant),
-            f"battery current {how}, shared out by the motor outputs{lasting}, which each motor "
-            f"follows within {1000 * constant:.0f} ms",
+            f"battery current {how}, shared out by the {source}{lasting}, which each motor follows "
+            f"within {1000 * constant:.0f} ms",
             numbers,
             unsure,
         )
@@ -74,15 +77,62 @@ def currents_of_motors(recording: Recording) -> tuple[Control, ...]:
     )
 
 
-def _told(recording: Recording) -> tuple[Series, Series, tuple[int, ...]] | None:
-    """Shares of the motors and their total current when the outputs were told, and which motors.
+class _Told(NamedTuple):
+    """What each motor draws when it was told, and who told it.
 
-    The shares of motors at rest are nothing.
+    Attributes
+    ----------
+    share
+        Of the total, shape (n, k); nothing of motors at rest.
+    total
+        In A, at the same times.
+    told_at
+        What these times were before they were brought to the battery's, shape (n,).
+    numbers
+        Of which motor each column is.
+    source
+        In words.
     """
-    duty = duty_of(recording)
-    if recording.current is None or duty is None or len(duty.numbers) < _LEAST_MOTORS:
+
+    share: Series
+    total: Series
+    told_at: FloatArray
+    numbers: tuple[int, ...]
+    source: str
+
+
+def _told(recording: Recording) -> _Told | None:
+    """By the speed controllers where every motor's reports its current, else by the outputs."""
+    if recording.current is None:
         return None
-    found = rebuild(recording.current, duty.series, MOTORS, "battery current")
+    return _told_by_controllers(recording, recording.current) or _told_by_outputs(
+        recording, recording.current
+    )
+
+
+def _told_by_controllers(recording: Recording, current: Series) -> _Told | None:
+    duty, escs = duty_of(recording), recording.esc_currents
+    if duty is None or len(duty.numbers) < _LEAST_MOTORS or not set(duty.channels) <= set(escs):
+        return None
+    each = [escs[channel] for channel in duty.channels]
+    time = each[0].time
+    drawn = np.maximum(np.column_stack([interpolate(one, time) for one in each]), 0.0)
+    whole = drawn.sum(axis=1, keepdims=True)
+    # Of its largest: a battery's current is a curve in what the controllers measure.
+    load = Series(time, whole / max(float(whole.max()), _LEAST_A))
+    found = rebuild(current, load, MOTORS, "battery current", measured=True)
+    if found is None:
+        return None
+    total = found.control.series
+    share = drawn / np.maximum(whole, _LEAST_A)
+    return _Told(Series(total.time, share), total, time, duty.numbers, "speed controllers")
+
+
+def _told_by_outputs(recording: Recording, current: Series) -> _Told | None:
+    duty = duty_of(recording)
+    if duty is None or len(duty.numbers) < _LEAST_MOTORS:
+        return None
+    found = rebuild(current, duty.series, MOTORS, "battery current")
     if found is None:
         return None
     level, *slopes = found.coefficients
@@ -93,11 +143,11 @@ def _told(recording: Recording) -> tuple[Series, Series, tuple[int, ...]] | None
     # The battery sags for all motors alike: what outputs do not explain is shared in proportion.
     share = each / np.maximum(each.sum(axis=1, keepdims=True), _LEAST_A)
     total = found.control.series
-    return Series(total.time, share), total, duty.numbers
+    return _Told(Series(total.time, share), total, duty.series.time, duty.numbers, "motor outputs")
 
 
 def drawn_and_driven(recording: Recording) -> tuple[Control, Control] | None:
-    """What each motor draws and what drives it, at the times the outputs were told, and only then.
+    """What each motor draws and what drives it, where both were told, and only then.
 
     Returns
     -------
@@ -108,9 +158,9 @@ def drawn_and_driven(recording: Recording) -> tuple[Control, Control] | None:
     found, drive = _told(recording), drive_of_motors(recording)
     if found is None or drive is None:
         return None
-    share, total, numbers = found
-    drawn = Series(total.time, share.value * total.value[:, None])
-    return Control(MOTORS, drawn, "as the outputs tell it", numbers), drive
+    drawn = Series(found.total.time, found.share.value * found.total.value[:, None])
+    drive = replace(drive, series=Series(drawn.time, interpolate(drive.series, found.told_at)))
+    return Control(MOTORS, drawn, f"as the {found.source} tell it", found.numbers), drive
 
 
 def _often(time: FloatArray) -> FloatArray:

@@ -61,7 +61,7 @@ def with_speed_controllers(recording: Recording) -> Recording:
         voltage=None,
         battery=SPEED_CONTROLLERS,
         other_currents=others,
-        esc_current=None,
+        esc_currents={},
     )
 
 

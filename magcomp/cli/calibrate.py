@@ -10,6 +10,7 @@ import click
 
 from magcomp.analysis import Options
 from magcomp.cli.linking import (
+    ADDRESS_EPILOG,
     LinkOptions,
     StatusLine,
     address_argument,
@@ -30,7 +31,7 @@ _LOOK_S = 0.25
 _LEAST_CHANGE_S = 2.0
 
 
-@click.command("calibrate")
+@click.command("calibrate", epilog=ADDRESS_EPILOG)
 @address_argument
 @click.option("--seconds", type=float, metavar="S", help="End after so long at the latest.")
 @record_option

@@ -36,6 +36,12 @@ HEARTBEAT_S = 10.0
 """How long the first heartbeat is waited for."""
 
 
+ADDRESS_EPILOG = (
+    "ADDRESS says where the vehicle is: udp:14550 listens for one; tcp:HOST:PORT, "
+    "udpout:HOST:PORT, /dev/ttyACM0 and COM7,57600 reach one."
+)
+
+
 def say_meaning(address: str) -> str:
     """Say what an address means, where it was typed short; what is none is left to the link."""
     with contextlib.suppress(AddressError):

@@ -71,7 +71,9 @@ class Selection:
 def selection_options(command: Callable[..., _Result]) -> Callable[..., _Result]:
     """Give a command the options of a `Selection`, by the names of its attributes."""
 
-    @click.option("--compass", type=click.IntRange(1, 4), help="One compass; all by default.")
+    @click.option(
+        "--compass", type=click.IntRange(1, 4), metavar="N", help="One compass; all by default."
+    )
     @click.option(
         "--start", type=float, default=-math.inf, metavar="S", help="Leave out what is before, s."
     )

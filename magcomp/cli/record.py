@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from magcomp.cli.linking import (
+    ADDRESS_EPILOG,
     LinkOptions,
     StatusLine,
     address_argument,
@@ -25,7 +26,7 @@ from magcomp.live.snapshot import LiveSnapshot
 _LOOK_S = 0.25
 
 
-@click.command("record")
+@click.command("record", epilog=ADDRESS_EPILOG)
 @address_argument
 @click.option(
     "-o",

@@ -32,8 +32,22 @@ _PAGE, _TABLE = "index.html", "table.json"
     metavar="DIR",
     help="Where the recordings are; sitl_fixtures of the source by default.",
 )
-@click.option("--seed", type=click.IntRange(0), default=1, show_default=True, help="Simulation's.")
-@click.option("--compass", type=click.IntRange(1, 3), default=1, show_default=True)
+@click.option(
+    "--seed",
+    type=click.IntRange(0),
+    default=1,
+    show_default=True,
+    metavar="N",
+    help="Which simulated vehicle.",
+)
+@click.option(
+    "--compass",
+    type=click.IntRange(1, 3),
+    default=1,
+    show_default=True,
+    metavar="N",
+    help="Which of its compasses.",
+)
 @click.option("--force", is_flag=True, help="Overwrite files in DIR.")
 @json_option
 def reproduce(

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from magcomp.cli.linking import (
+    ADDRESS_EPILOG,
     LinkOptions,
     address_argument,
     any_vehicle_option,
@@ -33,7 +34,7 @@ _STANDS = {
 }
 
 
-@click.command("restore")
+@click.command("restore", epilog=ADDRESS_EPILOG)
 @click.argument("backup", type=click.Path(path_type=Path))
 @address_argument
 @dry_run_option

@@ -116,6 +116,7 @@ def _scenario_options(command: Callable[..., _Result]) -> Callable[..., _Result]
 @click.option(
     "--system",
     type=click.IntRange(1, 250),
+    metavar="N",
     default=1,
     show_default=True,
     help="Its MAVLink system, where several share a link.",

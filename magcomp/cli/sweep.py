@@ -11,6 +11,7 @@ import click
 from magcomp.analysis import Options
 from magcomp.cli.keys import Pressed, any_key, require_terminal
 from magcomp.cli.linking import (
+    ADDRESS_EPILOG,
     LinkOptions,
     StatusLine,
     address_argument,
@@ -32,7 +33,7 @@ from magcomp.sweeping.steps import LEAST_MOST, MOST_MOST, MOST_MOTORS
 _DEFAULT_MOST = 50.0
 
 
-@click.command("sweep")
+@click.command("sweep", epilog=ADDRESS_EPILOG)
 @address_argument
 @click.option(
     "--most",

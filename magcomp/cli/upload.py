@@ -11,6 +11,7 @@ from pathlib import Path
 import click
 
 from magcomp.cli.linking import (
+    ADDRESS_EPILOG,
     LinkOptions,
     StatusLine,
     address_argument,
@@ -78,7 +79,7 @@ class Writing:
     everything: bool = False
 
 
-@click.command("upload")
+@click.command("upload", epilog=ADDRESS_EPILOG)
 @click.argument("file", type=click.Path(path_type=Path))
 @address_argument
 @dry_run_option

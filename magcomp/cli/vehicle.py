@@ -13,11 +13,12 @@ _Result = TypeVar("_Result")
 def vehicle_options(command: Callable[..., _Result]) -> Callable[..., _Result]:
     """Give a command --system and --component, by those names."""
     system = click.option(
-        "--system", type=click.IntRange(1, 255), help="MAVLink system of the vehicle."
+        "--system", type=click.IntRange(1, 255), metavar="N", help="MAVLink system of the vehicle."
     )
     component = click.option(
         "--component",
         type=click.IntRange(1, 255),
+        metavar="N",
         help="MAVLink component of its autopilot, where it is not 1.",
     )
     return system(component(command))

@@ -99,7 +99,8 @@ def judge_present(
         grade=findings[0].grade,
         reasons=(
             *(finding.reason for finding in findings),
-            f"{unexplained:.1f} mGauss of {earth[0]:.0f} are unexplained",
+            f"of the field's {earth[0]:.0f} mGauss {unexplained:.1f} are not the earth's: motors, "
+            "iron, noise",
         ),
         heading_error=errors,
         residual=FieldResidual(unexplained, unexplained, unexplained, unexplained),

@@ -44,6 +44,10 @@ class Message(IntEnum):
     BATTERY_STATUS = 147
     AUTOPILOT_VERSION = 148
     STATUSTEXT = 253
+    ACTUATOR_OUTPUT_STATUS = 375
+    ESC_TELEMETRY_1_TO_4 = 11030
+    ESC_TELEMETRY_5_TO_8 = 11031
+    ESC_TELEMETRY_9_TO_12 = 11032
 
 
 WANTED = frozenset(int(message) for message in Message)

@@ -322,8 +322,8 @@ class Recording:
         Message that ``attitude`` is from; empty where there is none.
     other_attitudes
         Messages that tell the attitude too, the better ones first, to what they tell.
-    esc_current
-        Sum of the speed controllers' currents in A, shape (n,), where they report any.
+    esc_currents
+        Output, counted from 0, to the current in A of its speed controller, where it reports one.
     """
 
     source: str
@@ -349,4 +349,14 @@ class Recording:
     raw_compasses: frozenset[int] = frozenset()
     attitude_source: str = ""
     other_attitudes: Mapping[str, Series] = dataclasses.field(default_factory=dict)
-    esc_current: Series | None = None
+    esc_currents: Mapping[int, Series] = dataclasses.field(default_factory=dict)
+
+    @property
+    def esc_current(self) -> Series | None:
+        """Sum of the speed controllers' currents, at the times of the first; None without any."""
+        each = list(self.esc_currents.values())
+        if not each:
+            return None
+        at = each[0].time
+        total = sum((interpolate(one, at) for one in each), np.zeros(len(at)))
+        return Series(at, np.asarray(total))

@@ -60,7 +60,11 @@ def cloud(result: CompassResult, plots: CompassPlots, quantity: Quantity) -> Fig
         "The field in space",
         _caption(fit, quantity, len(levels)),
         [trace for trace, _ in far] + [trace | {"scene": "scene2"} for trace, _ in near],
-        _two(_corners([trace for trace, _ in far]), _corners([trace for trace, _ in near], ends)),
+        _two(
+            _corners([trace for trace, _ in far]),
+            _corners([trace for trace, _ in near], ends),
+            eye_beside(ends[1] - ends[0]),
+        ),
         height=SPACE_HEIGHT,
         wide=True,
         play=_play(fit, quantity, [u for _, u in [*far, *near]]),
@@ -243,7 +247,34 @@ def _corners(data: Sequence[Trace], points: FloatArray | None = None) -> FloatAr
     return np.stack([every.min(axis=0), every.max(axis=0)])
 
 
-def _two(far: FloatArray, near: FloatArray) -> dict[str, Any]:
+_EYE = np.array([1.8, -1.8, 0.8])
+_FLAT = 0.1
+"""Share of a line that must lie in the level plane to be seen better from one side."""
+
+
+def eye_beside(direction: FloatArray) -> FloatArray:
+    """Where to look from, so that a line is seen from its side and not from its end.
+
+    Parameters
+    ----------
+    direction
+        Of the line, body axes, shape (3,).
+
+    Returns
+    -------
+    ndarray
+        In a picture's own axes, of which the second and third are drawn reversed, shape (3,).
+    """
+    forward, right = float(direction[0]), -float(direction[1])
+    along = np.hypot(forward, right)
+    if along <= _FLAT * np.linalg.norm(direction):
+        return _EYE
+    beside = np.array([right, -forward]) / along
+    beside *= np.hypot(*_EYE[:2]) * (1.0 if beside @ _EYE[:2] >= 0.0 else -1.0)
+    return np.array([*beside, _EYE[2]])
+
+
+def _two(far: FloatArray, near: FloatArray, eye: FloatArray) -> dict[str, Any]:
     """Layout of a picture in space and, beside it, of what is too small to be seen in it."""
     whole, part = space(far), space(near)
     return {
@@ -253,7 +284,7 @@ def _two(far: FloatArray, near: FloatArray) -> dict[str, Any]:
             **part["scene"],
             **{f"{axis}axis": _near_axis(part["scene"][f"{axis}axis"]) for axis in "xyz"},
             "domain": {"x": [0.66, 1.0], "y": [0.0, 0.95]},
-            "camera": {"eye": {"x": 1.8, "y": -1.8, "z": 0.8}},
+            "camera": {"eye": dict(zip("xyz", rounded(eye, 3), strict=True))},
         },
         "annotations": [
             {

@@ -77,10 +77,9 @@ def check_line(verdicts: Mapping[int, Verdict], regressor: str) -> str:
     where = words.quantity(worst.u, regressor)
     who, verb = ("compasses", "are") if len(verdicts) > 1 else ("compass", "is")
     if all(verdict.grade is Grade.GOOD for verdict in verdicts.values()):
-        return (
-            f"Your {who} {verb} right: wrong by {words.degrees(worst.before)} at most, "
-            f"at {where}. Leave {'them' if len(verdicts) > 1 else 'it'} as it is."
-        ).replace("them as it is", "them as they are")
+        leave = "Leave them as they are." if len(verdicts) > 1 else "Leave it as it is."
+        now, most = words.degrees(worst.before), words.degrees(worst.p95)
+        return f"Your {who} {verb} right: wrong by {now} at {where}, at most by {most}. {leave}"
     return (
         f"At {where} your {who} {verb} up to {words.degrees(worst.before)} wrong. "
         "Fit this log: magcomp fit."

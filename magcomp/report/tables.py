@@ -127,8 +127,6 @@ def check(verdicts: Mapping[int, Verdict], regressor: str) -> ByWidth:
     """What a check of the calibration in force rests on."""
     columns = _Columns(sorted(verdicts))
     ordered = [verdicts[compass] for compass in sorted(verdicts)]
-    columns.section("unexplained field, mGauss")
-    columns.row("in force", (f"{verdict.residual.before:.1f}" for verdict in ordered))
     _coverage(columns, ordered, regressor)
     return ByWidth(columns.tables)
 

@@ -41,8 +41,13 @@ _LEADING = (
 )
 # The position's time is that of the fix; microseconds wrap after 71 minutes, and in some firmware
 # are not those since boot.
-_FOLLOWING = (Message.RAW_IMU, Message.SERVO_OUTPUT_RAW, Message.GLOBAL_POSITION_INT)
-_MICROSECONDS = (Message.RAW_IMU, Message.SERVO_OUTPUT_RAW)
+_FOLLOWING = (
+    Message.RAW_IMU,
+    Message.SERVO_OUTPUT_RAW,
+    Message.ACTUATOR_OUTPUT_STATUS,
+    Message.GLOBAL_POSITION_INT,
+)
+_MICROSECONDS = (Message.RAW_IMU, Message.SERVO_OUTPUT_RAW, Message.ACTUATOR_OUTPUT_STATUS)
 
 _LATEST_STAMP = 1 << 53
 
@@ -203,6 +208,7 @@ def _recording(decoded: Decoded, source: str, kind: str) -> Recording:
         armed=Series(heartbeats.time, quantities.armed(heartbeats.table)),
         format=kind,
         other_currents=quantities.other_currents(messages),
+        esc_currents=quantities.esc_currents(messages),
         raw_compasses=raw,
     )
 

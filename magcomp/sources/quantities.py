@@ -20,6 +20,13 @@ OUTPUTS = 16
 
 _ABSENT_CURRENT = -1
 _ABSENT_UINT16 = 0xFFFF
+_SHORTEST_US, _LONGEST_US = 800.0, 2200.0
+_A_MESSAGE = 4
+_CONTROLLERS = (
+    Message.ESC_TELEMETRY_1_TO_4,
+    Message.ESC_TELEMETRY_5_TO_8,
+    Message.ESC_TELEMETRY_9_TO_12,
+)
 _FULL_THROTTLE = 100
 _FIX_3D = 3
 
@@ -132,12 +139,39 @@ def voltage(messages: Messages) -> Series | None:
 
 def outputs(messages: Messages) -> Series | None:
     """Servo outputs in microseconds, shape (n, 16); MAVLink 1 has the first eight."""
-    if Message.SERVO_OUTPUT_RAW not in messages:
+    whole = None
+    if Message.SERVO_OUTPUT_RAW in messages:
+        time, table = messages[Message.SERVO_OUTPUT_RAW]
+        value = columns(table, *(f"servo{n}_raw" for n in range(1, OUTPUTS + 1)))
+        value[value == _ABSENT_UINT16] = 0
+        whole = _series(time, value, table["port"] == 0)
+    return _fuller(_actuator_outputs(messages), whole)
+
+
+def _actuator_outputs(messages: Messages) -> Series | None:
+    """The same as PX4 tells them, not rounded; rows that are no widths of pulses are left out."""
+    if Message.ACTUATOR_OUTPUT_STATUS not in messages:
         return None
-    time, table = messages[Message.SERVO_OUTPUT_RAW]
-    value = columns(table, *(f"servo{n}_raw" for n in range(1, OUTPUTS + 1)))
-    value[value == _ABSENT_UINT16] = 0
-    return _series(time, value, table["port"] == 0)
+    time, table = messages[Message.ACTUATOR_OUTPUT_STATUS]
+    with np.errstate(invalid="ignore"):
+        value = np.array(table["actuator"][:, :OUTPUTS], dtype=np.float64)
+    pulses = (value >= _SHORTEST_US) & (value <= _LONGEST_US)
+    value[~pulses] = 0.0
+    return _series(time, value, pulses.any(axis=1))
+
+
+def esc_currents(messages: Messages) -> dict[int, Series]:
+    """Current of each speed controller, A from 10 mA, by its output, counted from 0."""
+    found = {}
+    for place, message in enumerate(_CONTROLLERS):
+        if message not in messages:
+            continue
+        time, table = messages[message]
+        for column in range(_A_MESSAGE):
+            amperes = table["current"][:, column] / 100.0
+            if amperes.any():
+                found[_A_MESSAGE * place + column] = Series(time, amperes)
+    return found
 
 
 def position(messages: Messages) -> Series | None:
@@ -298,8 +332,8 @@ def _cell_sum(messages: Messages) -> Series | None:
     return _series(time, total / 1000.0, _is_first(table) & present.any(axis=1))
 
 
-def _fuller(battery: Series | None, system: Series | None) -> Series | None:
-    """The series with more rows; the battery's own where both have as many."""
-    if battery is None or system is None:
-        return battery or system
-    return battery if len(battery) >= len(system) else system
+def _fuller(first: Series | None, second: Series | None) -> Series | None:
+    """The series with more rows; the first where both have as many."""
+    if first is None or second is None:
+        return first or second
+    return first if len(first) >= len(second) else second

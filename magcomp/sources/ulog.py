@@ -116,7 +116,7 @@ def read_ulog(path: str | Path) -> Recording:
         armed=armed,
         format="ulog",
         battery=battery,
-        esc_current=quantities.esc_current(),
+        esc_currents=quantities.esc_currents(),
         other_currents={n: each for n, each in batteries.items() if n != battery},
         raw_compasses=frozenset(n for n, each in compasses.items() if each.raw),
     )

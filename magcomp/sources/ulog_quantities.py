@@ -21,6 +21,8 @@ _FIX_3D = 3
 _OUTPUTS = 16
 _MOTORS = 12
 _ESCS = 8
+_MOTOR_1 = 101
+"""Number of the output function of motor 1."""
 _THRUST_TOPIC_ALONE = (1, 14)
 """From here on P is the length of the thrust setpoint; before it was control 3."""
 
@@ -119,16 +121,26 @@ class Quantities:
         first, second = (1, 0) if switched else (0, 1)
         return second if first not in currents and second in currents else first
 
-    def esc_current(self) -> Series | None:
-        """Sum of the speed controllers' currents in A, where any reports one."""
+    def esc_currents(self) -> dict[int, Series]:
+        """Current of each speed controller, A, by the motor it drives, counted from 0.
+
+        From 1.13 on it says by itself which motor that is.
+        """
         topic = self.log.topic("esc_status")
-        names = [f"esc[{number}].esc_current" for number in range(_ESCS)]
-        told = [] if topic is None else [name for name in names if name in topic]
-        if topic is None or not told:
-            return None
-        total = np.sum([topic.number(name) for name in told], axis=0)
-        found = _series(self._said(topic), total, np.abs(total) < _MOST_OF_A_BATTERY)
-        return found if found is not None and found.value.any() else None
+        found: dict[int, Series] = {}
+        for place in range(_ESCS):
+            name, function = (
+                f"esc[{place}].{part}" for part in ("esc_current", "actuator_function")
+            )
+            if topic is None or name not in topic:
+                continue
+            value = topic.number(name)
+            series = _series(self._said(topic), value, np.abs(value) < _MOST_OF_A_BATTERY)
+            if series is None or not series.value.any():
+                continue
+            driven = int(topic.number(function)[-1]) - _MOTOR_1 if function in topic else place
+            found.setdefault(driven if 0 <= driven < _MOTORS else place, series)
+        return dict(sorted(found.items()))
 
     def voltage(self, battery: int) -> Series | None:
         """Volts of a battery instance."""

@@ -133,7 +133,7 @@ def test_a_second_battery_that_feeds_the_motors_is_named(swept: Recording) -> No
 
 def test_the_speed_controllers_current_is_fitted_to_be_looked_at(swept: Recording) -> None:
     escs = Series(swept.current.time, 0.9 * swept.current.value)
-    found = analyse(replace(swept, esc_current=escs), Options(regressor="esc"))
+    found = analyse(replace(swept, esc_currents={0: escs}), Options(regressor="esc"))
     by_battery = analyse(swept).compasses[0].fit.interference
     np.testing.assert_allclose(found.compasses[0].fit.interference, by_battery / 0.9, rtol=0.02)
     assert "speed controllers" in found.compasses[0].fit.origin

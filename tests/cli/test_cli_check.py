@@ -5,12 +5,15 @@ from __future__ import annotations
 import itertools
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from logs_made_of_logs import FIXTURES, FLIGHT, SWEEP, frames
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from magcomp.cli.app import run
+from magcomp.model import Grade, HeadingError
+from magcomp.report.plain import check_line
 
 
 def test_a_flight_without_compensation_is_rejected(capsys: pytest.CaptureFixture[str]) -> None:
@@ -58,3 +61,11 @@ def test_a_compass_of_which_too_little_is_there_does_not_keep_the_others_from_be
     assert "Not judged: compass 2" in out
     assert run(["check", str(log), "--compass", "2"]) > 1
     assert "Compass 2 must have at least 60" in capsys.readouterr().err
+
+
+def test_the_first_line_tells_the_estimate_from_the_bound() -> None:
+    rows = (HeadingError(20.0, 0.4, 0.4, 1.8), HeadingError(30.0, 0.3, 0.3, 2.6))
+    good = SimpleNamespace(grade=Grade.GOOD, heading_error=rows)
+    assert check_line({1: good}, "current") == (
+        "Your compass is right: wrong by 0.4° at 20 A, at most by 1.8°. Leave it as it is."
+    )

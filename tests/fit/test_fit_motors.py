@@ -17,7 +17,7 @@ from magcomp.fit.motors import contrasts, differences_of, no_surer_than
 from magcomp.fit.robust import Estimate
 from magcomp.judge import judge
 from magcomp.judge.forms import forms, left_deg
-from magcomp.model import CURRENT, Lags
+from magcomp.model import CURRENT, Lags, Series
 
 ALIKE = Unequal(seed=2, vectors=np.tile(INTERFERENCE, (4, 1)))
 
@@ -56,6 +56,45 @@ def test_the_currents_of_the_motors_add_up_to_the_battery_and_follow_each_motor(
     assert control.numbers == (1, 2, 3, 4)
     assert np.abs(found - true).max() < 0.06 * true.max()
     assert np.abs(control.total.value[50:-50] - flown.current_at(middle)).max() < 0.5
+
+
+def with_controllers(flown, motors=(0, 1, 2, 3)):
+    """Outputs that are alike for all motors, and speed controllers that read 5 % too little."""
+    recording = flown.recording()
+    time = np.arange(0.0, flown.seconds + 1.0, 0.1)
+    rng = np.random.default_rng([flown.seed, 9])
+    told = 0.95 * flown.drawn_at(time) + rng.normal(scale=0.1, size=(len(time), 4))
+    outputs = recording.outputs.value.copy()
+    outputs[:, :4] = outputs[:, :4].mean(axis=1, keepdims=True)
+    return replace(
+        recording,
+        outputs=Series(recording.outputs.time, outputs),
+        esc_currents={motor: Series(time, told[:, motor]) for motor in motors},
+    )
+
+
+def test_speed_controllers_that_report_every_motors_current_tell_it():
+    flown = Unequal(seed=1)
+    found = currents_of_motors(with_controllers(flown))
+    assert all("shared out by the speed controllers" in each.origin for each in found)
+    middle = found[0].series.time[50:-50]
+    # Their own scale is not the battery's, by which the firmware multiplies.
+    whole = found[0].total.value[50:-50] - flown.current_at(middle)
+    each = found[0].series.value[50:-50] - flown.drawn_at(middle)
+    assert np.sqrt(np.mean(whole**2)) < 0.4
+    assert np.sqrt(np.mean(each**2)) < 0.15
+    short = currents_of_motors(with_controllers(flown, motors=(0, 1, 2)))
+    assert all("motor outputs" in each.origin for each in short)
+
+
+def test_each_motors_vector_is_found_from_what_the_speed_controllers_report():
+    recording = with_controllers(Unequal(seed=1))
+    forms = currents_of_motors(recording)
+    found = controls(recording)
+    new, in_force = readings(recording, 1), to_undo(recording, found)
+    by_motor = fit(best_form([Problem(new, form, in_force, earth()) for form in forms]))
+    apart = np.linalg.norm(-by_motor.correction.motor.T - VECTORS, axis=1)
+    assert np.all(apart < 0.07 * np.linalg.norm(VECTORS, axis=1))
 
 
 def test_each_motors_vector_is_found_within_a_twentieth():

@@ -11,6 +11,7 @@ from report_analyses import Case, flown, refused, still
 from magcomp.errors import MissingDataError
 from magcomp.fit import spread
 from magcomp.report.evidence import CompassPlots, compass_plots
+from magcomp.report.figures_cloud import eye_beside
 
 CASES = [still, flown, refused]
 
@@ -77,3 +78,17 @@ def test_the_level_errors_in_force_are_within_those_of_all_attitudes() -> None:
     quoted = made.document["compasses"][0]["quoted"]
     largest = float(np.degrees(np.abs(plots.level_errors).max()))
     assert 0.3 * quoted["before"] < largest <= quoted["before"]
+
+
+@pytest.mark.parametrize(
+    "direction", [(-1.1, -1.9, -0.4), (1.0, 0.0, 0.0), (0.0, 1.0, 0.5), (1.0, -1.0, 2.0)]
+)
+def test_the_line_of_centres_is_looked_at_from_its_side(direction) -> None:
+    eye = eye_beside(np.array(direction))
+    # The picture's second axis runs against the vehicle's.
+    assert eye[0] * direction[0] - eye[1] * direction[1] == pytest.approx(0.0)
+    assert eye @ (1.8, -1.8, 0.8) > 0.0
+
+
+def test_a_line_that_stands_upright_is_seen_from_anywhere() -> None:
+    assert eye_beside(np.array([0.01, 0.0, 3.0])) == pytest.approx([1.8, -1.8, 0.8])

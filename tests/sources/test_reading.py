@@ -148,6 +148,37 @@ def test_servo_outputs_have_sixteen_channels_of_the_main_port() -> None:
     assert values(recording.outputs) == [list(range(1001, 1017))]
 
 
+def test_outputs_that_px4_tells_unrounded_are_taken_where_they_come_more_often() -> None:
+    sender = Sender()
+    found = recording_of(
+        sender.servos(5_000_000, 1500),
+        sender.actuators(5_000_000, 1500.25, 1100.5, -1.0, float("nan")),
+        sender.actuators(5_100_000, 1500.5, 1100.5),
+        sender.actuators(5_200_000, -1.0, 0.0),
+    ).outputs
+    assert found is not None
+    assert found.value[:, :4].tolist() == [[1500.25, 1100.5, 0.0, 0.0], [1500.5, 1100.5, 0.0, 0.0]]
+    assert found.value.shape == (2, 16)
+    assert np.diff(found.time).tolist() == pytest.approx([0.1])
+
+
+def test_speed_controllers_have_the_currents_of_their_outputs() -> None:
+    sender = Sender()
+    found = recording_of(
+        sender.controllers(100, 200, 300, 0),
+        sender.controllers(150, 250, 350, 0),
+        sender.controllers(0, 75, 0, 0, first=5),
+    )
+    assert {place: each.value.tolist() for place, each in found.esc_currents.items()} == {
+        0: [1.0, 1.5],
+        1: [2.0, 2.5],
+        2: [3.0, 3.5],
+        5: [0.75],
+    }
+    assert found.esc_current is not None
+    assert found.esc_current.value.tolist() == [6.75, 8.25]
+
+
 def test_position_comes_from_the_estimate_or_else_from_the_gps() -> None:
     sender = Sender()
     gps = [

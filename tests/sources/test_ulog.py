@@ -13,7 +13,16 @@ from effort import examples
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pyulog import ULog
-from ulog_writer import FORMS, START_US, SYNC, Writer, message, short_flight, slot
+from ulog_writer import (
+    ESC_REPORT_OF_FUNCTIONS,
+    FORMS,
+    START_US,
+    SYNC,
+    Writer,
+    message,
+    short_flight,
+    slot,
+)
 
 from magcomp.errors import InputError, LogError
 from magcomp.model import Recording
@@ -151,6 +160,15 @@ def test_the_speed_controllers_currents_are_summed(recorded) -> None:
     found = recorded(writer)
     assert found.esc_current.value.tolist() == [7.0, 8.0, 9.0, 10.0, 11.0]
     assert found.attitude_source == "vehicle_attitude"
+
+
+def test_a_speed_controller_that_says_which_motor_it_drives_is_that_motors(recorded) -> None:
+    writer = short_flight(1)
+    writer.forms = {**writer.forms, "esc_report": ESC_REPORT_OF_FUNCTIONS}
+    for n in range(5):
+        writer.row("esc_status", n / 10, 0, 3.0 + n, 104, 0, 4.0, 101)
+    found = recorded(writer).esc_currents
+    assert {motor: each.value[0] for motor, each in found.items()} == {0: 4.0, 3: 3.0}
 
 
 def batteries(switch: int) -> Writer:

@@ -91,6 +91,20 @@ class Sender:
             dialect.MAVLink_servo_output_raw_message(boot_us, port, *padded[:8], *padded[8:])
         )
 
+    def actuators(self, boot_us: int, *output: float) -> bytes:
+        padded = (*output, *[0.0] * (32 - len(output)))
+        return self.frame(
+            dialect.MAVLink_actuator_output_status_message(boot_us, len(output), padded)
+        )
+
+    def controllers(self, *centiamps: int, first: int = 1) -> bytes:
+        kind = {
+            1: dialect.MAVLink_esc_telemetry_1_to_4_message,
+            5: dialect.MAVLink_esc_telemetry_5_to_8_message,
+        }[first]
+        nothing = [0, 0, 0, 0]
+        return self.frame(kind(bytes(4), nothing, list(centiamps), nothing, nothing, nothing))
+
     def parameter(self, name: str, value: float, kind: int = 9) -> bytes:
         return self.frame(
             dialect.MAVLink_param_value_message(name.encode(), value, kind, 1000, 65535)

@@ -53,8 +53,10 @@ def code_of(form: str) -> str:
     return found
 
 
-ESC_STATUS = "<QQfQf"
-"""A format inside another, laid out."""
+ESC_STATUS, ESC_STATUS_OF_FUNCTIONS = "<QQfQf", "<QQfBQfB"
+"""A format inside another, laid out; from 1.13 on with what each output does."""
+
+ESC_REPORT_OF_FUNCTIONS = "uint64_t timestamp;float esc_current;uint8_t actuator_function;"
 
 
 def parameter(name: str, value: float) -> bytes:
@@ -83,7 +85,9 @@ class Writer:
             self.raw(message("A", struct.pack("<BH", instance, number) + name.encode()))
         stamped = [round(value * 1e6) + START_US if n == 0 else value for n, value in
                    enumerate(values)]  # fmt: skip
-        code = ESC_STATUS if name == "esc_status" else code_of(self.forms[name])
+        code = code_of(self.forms[name]) if name != "esc_status" else ESC_STATUS
+        if name == "esc_status" and self.forms["esc_report"] == ESC_REPORT_OF_FUNCTIONS:
+            code = ESC_STATUS_OF_FUNCTIONS
         body = struct.pack(code, *stamped)
         self.raw(message("D", struct.pack("<H", self._topics[name, instance]) + body))
 

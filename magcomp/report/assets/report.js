@@ -110,7 +110,7 @@
     layout.scene.domain = { x: [0, 0.9], y: [0.42, 1] };
     layout.scene2.domain = { x: [0, 0.9], y: [0, 0.36] };
     // Titles of axes are cut at the edges of a picture, so it is looked at from further away.
-    for (const [scene, further] of [[layout.scene, 1.5], [layout.scene2, 1.2]]) {
+    for (const [scene, further] of [[layout.scene, 1.7], [layout.scene2, 1.1]]) {
       for (const axis of "xyz") {
         scene.camera.eye[axis] *= further;
         scene[axis + "axis"].title.text = scene[axis + "axis"].title.text.split(" ")[0];

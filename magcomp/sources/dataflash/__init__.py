@@ -122,7 +122,7 @@ def _recording(source: str, unpacked: Unpacked, size: int) -> Recording:
         other_currents={number: each for number, each in current.items() if number},
         applied=_applied(readings, parameters),
         attitude_source=attitude,
-        esc_current=quantities.esc_current(log),
+        esc_currents=quantities.esc_currents(log),
         other_attitudes={name: each for name, each in attitudes.items() if name != attitude},
     )
 

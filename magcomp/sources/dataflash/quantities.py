@@ -121,23 +121,21 @@ def batteries(log: Log) -> tuple[dict[int, Series], dict[int, Series]]:
     return current, voltage
 
 
-def esc_current(log: Log) -> Series | None:
-    """Sum of the speed controllers' currents, A, at the times of the one that reports first."""
-    found: list[Series] = []
-    for name in _ESCS:
+def esc_currents(log: Log) -> dict[int, Series]:
+    """Current of each speed controller, A, by its output, counted from 0."""
+    found: dict[int, Series] = {}
+    for place, name in enumerate(_ESCS):
         got = log.get(name)
         if got is None or "Curr" not in got[1].names:
             continue
         time, table = got
         value = table.numbers("Curr") * (1.0 if table.is_float("Curr") else _CENTI)
         sound = np.abs(value) < _MOST_OF_A_BATTERY
-        each = (_series(time, value, rows & sound) for _, rows in _instances(table, 0))
-        found.extend(series for series in each if series is not None)
-    if not found:
-        return None
-    at = found[0].time
-    total = sum((np.interp(at, each.time, each.value) for each in found), np.zeros(len(at)))
-    return Series(at, total)
+        for number, rows in _instances(table, max(place - 1, 0)):
+            series = _series(time, value, rows & sound)
+            if series is not None and series.value.any():
+                found.setdefault(number, series)
+    return dict(sorted(found.items()))
 
 
 def throttle(log: Log, kind: str) -> Series | None:

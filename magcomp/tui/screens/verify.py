@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterable
 from typing import ClassVar
 
@@ -23,9 +24,8 @@ from magcomp.tui.work import Writing
 _PLOT_EVERY_S = 0.5
 _MARKED_LINES = 3
 _EDGES = 2
-_CONTROLS = 4
-_LEAST_PLOT = 8
-"""Lines: of a compass with a mark, of a panel's border, of the motors, of a plot worth its room."""
+_LEAST_PLOT = 9
+"""Lines: of a compass with a mark, of a panel's border, of a plot worth its room."""
 
 
 class VerifyScreen(StepScreen):
@@ -93,8 +93,11 @@ class VerifyScreen(StepScreen):
     def _make_room(self) -> None:
         """Give the headings the lines they need, and the rest to the plot where that is enough."""
         lines = 1 + len(self._pairs) * (_MARKED_LINES if self._watch.marked else 1) + _EDGES
-        above_below = _CONTROLS + self._said.count("\n") + 1
-        plot = self.query_one(".body").size.height - above_below - lines >= _LEAST_PLOT
+        width = max(self.size.width - 2, 1)
+        said = sum(len(textwrap.wrap(line, width)) for line in self._said.split("\n"))
+        controls = 4 if self.has_class("-tall") else 2
+        room = self.query_one(".body").size.height - controls - said - lines
+        plot = room >= _LEAST_PLOT
         looks = (plot, lines, self._watch.marked)
         if looks != self._looks:
             self._looks = looks
