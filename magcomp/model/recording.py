@@ -325,6 +325,9 @@ class Recording:
         Messages that tell the attitude too, the better ones first, to what they tell.
     esc_currents
         Output, counted from 0, to the current in A of its speed controller, where it reports one.
+    forward
+        1 where a vehicle that can do both flies on its wings or goes over to or from them, 0 where
+        it hovers, from each time on, shape (n,); None where it does not say.
     """
 
     source: str
@@ -351,6 +354,7 @@ class Recording:
     attitude_source: str = ""
     other_attitudes: Mapping[str, Series] = dataclasses.field(default_factory=dict)
     esc_currents: Mapping[int, Series] = dataclasses.field(default_factory=dict)
+    forward: Series | None = None
 
     @property
     def esc_current(self) -> Series | None:
