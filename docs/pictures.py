@@ -2,7 +2,7 @@
 
     python docs/pictures.py [FOLDER]
 
-Takes about two minutes, because the vehicle really flies.
+Takes about five minutes, because the vehicle really flies.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from magcomp.tui.services import Services, Simulation
 from magcomp.tui.settings import Settings
 
 SIZE = (118, 38)
-SPEED = 3.0
+SPEED = 1.5
 
 
 def simulate(autopilot: str) -> Simulation:
-    """A vehicle, three times as fast as life."""
+    """A vehicle, a little faster than life: the fits so far must keep up with it."""
     stop, ready, address = threading.Event(), threading.Event(), []
 
     def announce(reached_at: str) -> None:

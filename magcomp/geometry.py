@@ -76,6 +76,35 @@ def gravity_direction(roll: ArrayLike, pitch: ArrayLike) -> FloatArray:
     return np.moveaxis(down, 0, -1)
 
 
+def gravity_and_rate(
+    roll: FloatArray, pitch: FloatArray, roll_rate: FloatArray, pitch_rate: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """:func:`gravity_direction` and its change per second, shape (n, 3) each.
+
+    Parameters
+    ----------
+    roll, pitch, roll_rate, pitch_rate
+        Radians, and radians per second, shape (n,).
+
+    Examples
+    --------
+    A level vehicle that pitches up by 1 rad/s:
+
+    >>> none, one = np.zeros(1), np.ones(1)
+    >>> (gravity_and_rate(none, none, none, one)[1] + 0.0).tolist()
+    [[-1.0, 0.0, 0.0]]
+    """
+    sin_roll, cos_roll = np.sin(roll), np.cos(roll)
+    sin_pitch, cos_pitch = np.sin(pitch), np.cos(pitch)
+    down, rate = np.empty((2, 3, len(roll)))
+    down[0], down[1], down[2] = -sin_pitch, sin_roll * cos_pitch, cos_roll * cos_pitch
+    falling = sin_pitch * pitch_rate
+    rate[0] = -cos_pitch * pitch_rate
+    rate[1] = down[2] * roll_rate - sin_roll * falling
+    rate[2] = -down[1] * roll_rate - cos_roll * falling
+    return down.T, rate.T
+
+
 def body_from_earth(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> FloatArray:
     """Rotation from north-east-down axes to body axes, shape (..., 3, 3).
 

@@ -32,6 +32,9 @@ from magcomp.model import (
 )
 
 _SHIFTS = np.arange(-0.2, 0.301, 0.02)
+_COARSE = 3
+"""Every so manieth shift is tried, and then those around the best: a vehicle's current has no two
+that fit so near each other."""
 _TREND_S = 5.0
 _LEAST_ROWS = 30
 POWERS = (1, 2, 3)
@@ -43,8 +46,10 @@ _SMOOTHINGS = (0.03, 0.06, 0.1, 0.15, 0.2, 0.3, 0.5)
 
 PX4's telemetry does by 0.5 up to 1.15: docs/autopilots.md, PX4: link.
 """
-_STEPS_SEEN = 1.5
-_CLEARLY_SMOOTHED = 0.9
+_STEPS_SEEN = 0.4
+"""Of the step at which outputs are told: a shorter smoothing is lost between them."""
+_CLEARLY_SMOOTHED = 0.97
+_STEPS_OF_SMOOTHING = 4
 _MOST_REGRESSED = 20_000
 _MOST_ROWS = 1_000_000
 """More rows in even steps than this mean that the times are not to be trusted."""
@@ -265,8 +270,11 @@ def _rebuilt_through(
     # Enough to find four coefficients by: of hours of current every few readings.
     few = slice(None, None, -(-len(reference) // _MOST_REGRESSED))
     told = Series(reference.time[few], reference.value[few])
-    fits = [_regress(told, seen, shift) for shift in _SHIFTS]
-    best = min(range(len(fits)), key=lambda k: fits[k][1])
+    coarse = {k: _regress(told, seen, _SHIFTS[k]) for k in range(0, len(_SHIFTS), _COARSE)}
+    near = min(coarse, key=lambda k: coarse[k][1])
+    around = range(max(near - _COARSE + 1, 0), min(near + _COARSE, len(_SHIFTS)))
+    fits = coarse | {k: _regress(told, seen, _SHIFTS[k]) for k in around if k != near}
+    best = min(fits, key=lambda k: fits[k][1])
     coefficients, cost = fits[best]
     if not cost < (1 - _LEAST_EXPLAINED) * float(np.var(reference.value)):
         return None
@@ -284,8 +292,9 @@ def smoothed(series: Series, constant: float) -> Series:
     """What a first-order low pass of a time constant in seconds makes of columns, (n, k)."""
     if constant <= 0.0:
         return series
-    step = float(np.median(np.diff(series.time)))
-    if float(np.ptp(series.time)) > _MOST_ROWS * step:
+    told, length = float(np.median(np.diff(series.time))), float(np.ptp(series.time))
+    step = max(min(told, constant / _STEPS_OF_SMOOTHING), length / _MOST_ROWS)
+    if step > told:
         return series
     time = np.arange(series.time[0], series.time[-1] + step, step)
     even = interpolate(series, time)

@@ -1,7 +1,8 @@
-"""Hover and forward flight of a quadplane: two sources of interference, told apart by outputs.
+"""Hover and forward flight of a quadplane: two sources of interference, told apart.
 
 In forward flight the lift motors rest and a pusher draws the current, through other wires. One
-vector fits neither where both are mixed.
+vector fits neither where both are mixed. A firmware that says in which it is, is believed; of
+others the outputs tell.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ _DRAWING = 0.15
 
 _LEAST_SHARE = 0.02
 _MARGIN_S = 1.0
+_STEP_S = 0.5
 
 
 def on_lift_alone(recording: Recording) -> tuple[Recording, str]:
@@ -37,7 +39,8 @@ def on_lift_alone(recording: Recording) -> tuple[Recording, str]:
     str
         Empty where nothing was left out.
     """
-    pushed = _pushed(recording)
+    said = _said(recording)
+    pushed = _pushed(recording) if said is None else said
     if pushed is None:
         return recording, ""
     time, away, share = pushed
@@ -50,12 +53,31 @@ def on_lift_alone(recording: Recording) -> tuple[Recording, str]:
 
     field = {compass: kept(series) for compass, series in recording.field.items()}
     current = None if recording.current is None else kept(recording.current)
+    what = "a pusher drives the vehicle" if said is None else "the vehicle flies forward"
     told = (
-        f"a pusher drives the vehicle in {100.0 * share:.0f} % of the time its motors work: only "
+        f"{what} in {100.0 * share:.0f} % of the time its motors work: only "
         "what was flown on the lift motors alone is used, and the answer holds for hovering, for a "
         "pusher's current disturbs in its own way"
     )
     return replace(recording, field=field, current=current), told
+
+
+def _said(recording: Recording) -> tuple[FloatArray, BoolArray, float] | None:
+    """The same by what the firmware says of itself; None where it does not."""
+    forward, current = recording.forward, recording.current
+    if forward is None or not len(forward) or current is None or not len(current):
+        return None
+    time = np.arange(forward.time[0], max(forward.time[-1], current.time[-1]), _STEP_S)
+    last = np.searchsorted(forward.time, time, side="right") - 1
+    away = forward.value[last] > 0.0
+    busy = np.interp(time, current.time, current.value) > _least_drawn(current)
+    share = float(np.mean(away[busy])) if busy.any() else 0.0
+    return time, np.asarray(away), share
+
+
+def _least_drawn(current: Series) -> float:
+    """What motors draw at least, A."""
+    return _DRAWING * float(np.quantile(current.value, 0.98))
 
 
 def _pushed(recording: Recording) -> tuple[FloatArray, BoolArray, float] | None:
@@ -69,7 +91,7 @@ def _pushed(recording: Recording) -> tuple[FloatArray, BoolArray, float] | None:
     time = outputs.time
     drawn = np.interp(time, current.time, current.value)
     resting = duty.series.value.mean(axis=1) < _RESTING
-    working = drawn > _DRAWING * float(np.quantile(current.value, 0.98))
+    working = drawn > _least_drawn(current)
     away = resting & working
     for channel in motors.pushers:
         told = outputs.value[:, channel]

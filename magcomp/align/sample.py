@@ -6,9 +6,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from magcomp.align.low_pass import low_pass
 from magcomp.errors import MissingDataError
-from magcomp.geometry import gravity_direction
+from magcomp.geometry import gravity_and_rate
 from magcomp.model import (
+    LEANS_S,
     Control,
     FloatArray,
     Lags,
@@ -52,10 +54,7 @@ def sample(
     commanded = readings.time - lags.regressor
     attitude = interpolate(readings.attitude, measured)
     tilt = Series(readings.attitude.time, readings.attitude.value[:, :2])
-    before, after = (
-        gravity_direction(*interpolate(tilt, measured + step).T)
-        for step in (-_RATE_STEP_S, _RATE_STEP_S)
-    )
+    down, down_rate = gravity_and_rate(*attitude[:, :2].T, *_rate(tilt, measured).T)
     later = lags.regressor + readings.applied_later if lags.applied is None else lags.applied
     applied = readings.time - later
     raw, raw_rate = _undo(readings, in_force, applied)
@@ -68,12 +67,25 @@ def sample(
         raw_rate=raw_rate,
         present=_as_now(readings, raw, in_force, applied),
         attitude=attitude,
-        down=gravity_direction(attitude[:, 0], attitude[:, 1]),
-        down_rate=(after - before) / (2 * _RATE_STEP_S),
+        down=down,
+        down_rate=down_rate,
+        lean=_lean(readings, attitude[:, :2]),
         u=u,
         u_rate=_columns(_rate(control.series, commanded)),
         u_blur=_columns(interpolate(control.blurred, commanded)) - u,
     )
+
+
+def _lean(readings: Readings, tilt: FloatArray) -> FloatArray:
+    """What acceleration does to attitude, shape (n, 4); see :attr:`magcomp.model.Samples.lean`.
+
+    A multirotor accelerates where it leans, and its attitude filter takes the acceleration for
+    gravity within seconds. A sum of a fast and a slow one comes near any in between, and near one
+    that lets go again, as the vehicle does when its drag has caught up with its lean.
+    """
+    leaning = tilt - readings.usual_tilt
+    step = readings.step
+    return np.hstack([low_pass(leaning, step / (each + step)) for each in LEANS_S])
 
 
 def _columns(values: FloatArray) -> FloatArray:

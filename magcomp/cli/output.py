@@ -21,17 +21,19 @@ _LEAST_COLUMNS, _USUAL_COLUMNS, _MOST_COLUMNS = 60, 80, 100
 _GROWTH = 6
 """Columns that a line of ASCII may grow by: degrees become a word."""
 
-
-_COMMAND = "\n  magcomp "
+_ALONE = "\n  "
 
 
 def complain(message: str) -> None:
-    """Write one sentence to stderr, and the command it ends with on a line of its own."""
-    said, _, command = message.partition(_COMMAND)
+    """Write one sentence to stderr, and the command or path it ends with on a line of its own.
+
+    Such a line can be pasted as it is: it begins with two blanks, and no full stop follows.
+    """
+    said, _, alone = message.partition(_ALONE)
     sentence = _printable(said)
     if sentence and sentence[-1] not in ".!?:":
         sentence += "."
-    line = f"{_COMMAND}{_printable(command)}" if command else ""
+    line = f"{_ALONE}{_printable(alone)}" if alone else ""
     whole = f"magcomp: {sentence}{line}\n"
     _write(sys.stderr, in_words(whole) if takes_ascii_only(sys.stderr) else whole)
 

@@ -102,7 +102,7 @@ def sweep(
         outcome = _spin(session, bench, typed, status)
         session.stop_recording()
         if outcome.reason is not None:
-            complain(f"Recording: {record_to}")
+            complain(f"Recording:\n  {record_to}")
             raise_for_failure(outcome)
             return ExitCode.INTERRUPTED
         options = Options(method="sweep", regressor=regressor, start=begun)

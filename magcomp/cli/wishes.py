@@ -147,9 +147,9 @@ def _fit(session: LiveSession, options: Options, record_to: Path) -> tuple[Recor
             recording = session.recording()
             analysis = session.analyse(options, lambda what, share: step(f"fitting {what}", share))
     except InputError:
-        complain(f"The recording is kept: {record_to}")
+        complain(f"The recording is kept:\n  {record_to}")
         raise
-    complain(f"Recording: {record_to}")
+    complain(f"Recording:\n  {record_to}")
     return recording, analysis
 
 
@@ -169,7 +169,7 @@ def _show(recording: Recording, analysis: Analysis, chosen: ParameterSet, wishes
     present = recording.parameters.latest
     answer(as_text.analysis_text(analysis, shown, present, look(), advise=False))
     if written is not None:
-        complain(f"Written to {written}")
+        complain(f"Written to:\n  {written}")
 
 
 def _upload(

@@ -139,7 +139,7 @@ def carry_out(
         What ``raise_for_failure`` makes of a bad outcome, other than an interruption.
     """
     status = StatusLine()
-    complain(f"Backup: {backup}")
+    complain(f"Backup:\n  {backup}")
 
     def tell(event: Event) -> None:
         match event:

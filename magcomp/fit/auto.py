@@ -238,7 +238,8 @@ def fit_alike(problem: Problem, fit: MotorFit) -> MotorFit:
     of_range = float(np.quantile(problem.control.total.value, 0.98)) or 1.0
     begin[MOTOR] *= fit.u_high / of_range
     begin[SIZE:] = 0.0
-    found = estimate(problem, free, start=begin, with_covariance=False, rounds=_QUICK)
+    # Near enough for the sizes of the errors.
+    found = estimate(problem, free, start=begin, with_covariance=False, rounds=1)
     errors = errors_of(problem.sample(lags_of(found.parameters)), found.parameters)
     found = estimate(
         problem, free, start=found.parameters, errors=errors, with_covariance=False, rounds=_QUICK

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from magcomp.align.low_pass import low_pass
 from magcomp.fit.control_noise import Noise, noise_of, whitened
 from magcomp.model import (
     CORRECTION_SIZE,
+    LEANS_S,
     MOTOR,
     OFFSET,
     Correction,
@@ -20,7 +20,6 @@ from magcomp.model import (
     Lags,
     MotorFit,
     Samples,
-    median,
     pack,
     unpack,
 )
@@ -29,9 +28,6 @@ STRENGTH, SIN_DIP, FIELD_LAG, REGRESSOR_LAG, APPLIED_LAG = range(
     CORRECTION_SIZE, CORRECTION_SIZE + 5
 )
 LAGS = slice(FIELD_LAG, APPLIED_LAG + 1)
-LEANS_S = (2.0, 8.0)
-"""How soon a lean that is held shows in the attitude: between these, for most filters."""
-
 TILT = slice(LAGS.stop, LAGS.stop + 2)
 LEAN = slice(TILT.stop, TILT.stop + 2 * len(LEANS_S))
 BLUR = LEAN.stop
@@ -129,8 +125,9 @@ def _columns(samples: Samples, parameters: FloatArray) -> FloatArray:
     slopes[REGRESSOR_LAG] = -_dot(pulled, _across(correction.added(samples.u_rate))[:, None])
     slopes[APPLIED_LAG] = _dot(axes, _across(samples.raw_rate)[:, None])
     slopes[TILT] = -turned[:2]
-    for start, leaning in zip(range(LEAN.start, LEAN.stop, 2), _leaning(samples), strict=True):
-        slopes[start : start + 2] = slopes[TILT] * leaning[:, None]
+    lean = _across(samples.lean)
+    for place, start in enumerate(range(LEAN.start, LEAN.stop, 2)):
+        slopes[start : start + 2] = slopes[TILT] * lean[2 * place : 2 * place + 2, None]
     slopes[BLUR] = _dot(pulled, _across(correction.added(samples.u_blur))[:, None])
     columns[0] = _dot(axes, (inverse @ (corrected - earth))[:, None])
     columns[0] += np.tensordot(parameters[NUISANCE], slopes[NUISANCE], axes=1)
@@ -186,20 +183,6 @@ def _cross(one: FloatArray, other: FloatArray) -> FloatArray:
             one[0] * other[1] - one[1] * other[0],
         ]
     )
-
-
-def _leaning(samples: Samples) -> list[FloatArray]:
-    """Roll and pitch, followed by each of LEANS_S: what acceleration does to attitude, (2, n) each.
-
-    A multirotor accelerates where it leans, and its attitude filter takes the acceleration for
-    gravity within seconds. A sum of a fast and a slow one comes near any in between, and near one
-    that lets go again, as the vehicle does when its drag has caught up with its lean.
-    """
-    if len(samples) < 2:
-        return [np.zeros((2, len(samples))) for _ in LEANS_S]
-    step = max(float(median(np.diff(samples.time))), 1e-3)
-    tilt = samples.attitude[:, :2] - median(samples.attitude[:, :2])
-    return [low_pass(tilt, step / (each + step)).T for each in LEANS_S]
 
 
 def correction_at(parameters: FloatArray) -> Correction:

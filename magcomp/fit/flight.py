@@ -45,6 +45,7 @@ from magcomp.fit.field_model import (
     strength_and_dip,
 )
 from magcomp.fit.robust import (
+    NEGLIGIBLE,
     ROUNDS,
     Estimate,
     Prior,
@@ -79,6 +80,10 @@ LEAN_WIDTH = 0.1
 
 BLUR_WIDTH = 1.0
 """The field may follow the control quantity at once, or as late as its blurred form, or between."""
+
+SEARCHED = 0.1
+"""A search is over where a step raises the log-likelihood by no more: a third of a standard error
+along one direction, which changes no comparison and no size of an error."""
 
 LAG_MEAN_S, LAG_WIDTH_S, LAG_MOST_S = 0.08, 0.1, 0.6
 """The field and the current are late by some 0.1 s: docs/autopilots.md, ArduPilot: timing."""
@@ -259,6 +264,7 @@ def estimate(
             blocks=drift_blocks(problem.readings.time) if with_covariance and last else None,
             doubt=_doubt(known),
             rounds=rounds,
+            enough=NEGLIGIBLE if with_covariance and last else SEARCHED,
             feasible=is_physical,
         )
 

@@ -34,7 +34,7 @@ _DAMPING_START = 1e-6
 _DAMPING_MOST = 1e3
 _ANOTHER = 0.9
 _GAP_S, _GAP_STEPS = 2.0, 5.0
-_NEGLIGIBLE = 1e-3
+NEGLIGIBLE = 1e-3
 """A gain of log-likelihood that no digit of the answer notices."""
 
 Residuals = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
@@ -96,6 +96,7 @@ def solve(
     noise_floor: float = NOISE_FLOOR,
     noise: FloatArray | None = None,
     rounds: int = ROUNDS,
+    enough: float = NEGLIGIBLE,
     feasible: Callable[[FloatArray], bool] = lambda _: True,
 ) -> Estimate:
     """Find the most probable parameters.
@@ -120,16 +121,17 @@ def solve(
         σ per kind to be used as they are, shape (g,).
     rounds
         How often σ is re-estimated at most; few in a search that only compares.
+    enough
+        A step that raises the log-likelihood by no more is the last one.
     feasible
         Steps to parameters for which this is false are not taken.
     """
-    moving = prior.width > 0.0
     parameters = start.astype(np.float64)
     values, slopes = residuals(parameters)
     scale = spread_of(values, noise_floor) if noise is None else noise
     for _ in range(rounds if noise is None else 1):
         parameters, values, slopes = _descend(
-            residuals, parameters, values, slopes, prior, moving, scale, feasible
+            residuals, parameters, values, slopes, prior, scale, enough, feasible
         )
         if noise is not None:
             break
@@ -228,11 +230,12 @@ def _descend(
     values: FloatArray,
     slopes: FloatArray,
     prior: Prior,
-    moving: BoolArray,
     scale: FloatArray,
+    enough: float,
     feasible: Callable[[FloatArray], bool],
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Levenberg–Marquardt steps at fixed σ until they no longer help."""
+    moving = prior.width > 0.0
     precision = prior.precision[moving]
 
     def objective(at: FloatArray, left: FloatArray) -> float:
@@ -257,7 +260,7 @@ def _descend(
                 damping *= 10.0
                 continue
             promised = -float(gradient @ step[moving])
-            if promised < _NEGLIGIBLE:
+            if promised < enough:
                 break
             trial = parameters + step
             # A step that is hardly another than the last one is refused as that was.
@@ -266,7 +269,7 @@ def _descend(
                 trial_values, trial_slopes = residuals(trial)
                 value = objective(trial, trial_values)
                 if value <= now:
-                    progress = now - value > _NEGLIGIBLE
+                    progress = now - value > enough
                     parameters, values, slopes, now = trial, trial_values, trial_slopes, value
                     damping = max(damping * 0.1, _DAMPING_START)
                     break

@@ -12,7 +12,7 @@ from magcomp import __version__
 from magcomp.fleet.aircraft import Aircraft
 from magcomp.fleet.answer import Fleet
 from magcomp.fleet.as_text import counted, largest_motor, summary
-from magcomp.fleet.findings import Attention, date, quantity
+from magcomp.fleet.findings import Attention, date, quantity, texts
 from magcomp.fleet.flights import Flight
 from magcomp.fleet.history import CompassHistory
 from magcomp.fleet.task import report_name
@@ -37,7 +37,7 @@ _KNOWN_BY = {
 }
 
 _FLIGHT_HEAD = ("flight", "log", "verdict", "error in force", "fitted, 95 %", "up to", "remarks")
-_AIRCRAFT_HEAD = ("aircraft", "state", "logs", "newest", "error in force", "motors add at most")
+_AIRCRAFT_HEAD = ("aircraft", "state", "logs", "newest", "error in force", "motors add, mGauss")
 
 
 def html(fleet: Fleet, links: Mapping[str, str]) -> str:
@@ -86,7 +86,7 @@ def _aircraft(each: Aircraft, links: Mapping[str, str]) -> dict[str, Any]:
         "known": _KNOWN_BY[each.known_by],
         "logs": counted(each.logs, "log"),
         "newest": date(each.newest),
-        "findings": [words.printable(one.text) for one in each.findings],
+        "findings": [words.printable(text) for text in texts(each.findings)],
         "compasses": [_compass(one, links) for one in each.compasses],
     }
 

@@ -14,7 +14,8 @@ from rich.text import Text
 from magcomp import __version__
 from magcomp.fleet.aircraft import Aircraft
 from magcomp.fleet.answer import Fleet
-from magcomp.fleet.findings import Attention, date
+from magcomp.fleet.findings import Attention, date, texts
+from magcomp.model import quantity_of
 from magcomp.report import words
 from magcomp.report.as_text import render
 from magcomp.report.look import Look
@@ -23,7 +24,8 @@ _SIGN = {Attention.NONE: "●", Attention.LOOK: "◐", Attention.ACT: "○"}
 _STYLE = {Attention.NONE: "bold green", Attention.LOOK: "bold yellow", Attention.ACT: "bold red"}
 _SHOWN = 20
 _UNUSABLE_SHOWN = 10
-_NAME = 24
+_NAME = 20
+_COLUMNS = (("logs", 4), ("newest", 10), ("now", 6), ("fitted ≤", 8), ("adds, mGauss", 21))
 
 
 def fleet_text(fleet: Fleet, look: Look, *, verbose: bool = False) -> str:
@@ -79,8 +81,8 @@ def _urgent(fleet: Fleet, verbose: bool) -> Iterator[RenderableType]:
             (words.printable(each.name), "bold"),
             (f"  {words.printable(each.kind)} {words.printable(each.firmware)}", "dim"),
         )
-        for finding in each.findings:
-            yield Padding(Text(words.sentence(words.printable(finding.text))), (0, 1, 0, 3))
+        for text in texts(each.findings):
+            yield Padding(Text(words.sentence(words.printable(text))), (0, 1, 0, 3))
     hidden = 0 if verbose else len(needing) - _SHOWN
     if hidden > 0:
         yield Text(f"\n and {hidden} more: see -v, --html or --csv", style="dim")
@@ -92,7 +94,7 @@ def _all(fleet: Fleet, verbose: bool) -> Iterator[RenderableType]:
     table = Table(box=None, pad_edge=False, padding=(0, 1), show_edge=False)
     table.add_column()
     table.add_column(Text("aircraft", style="dim"), overflow="ellipsis", no_wrap=True)
-    for title, least in (("logs", 5), ("newest", 10), ("now", 6), ("fitted ≤", 8), ("adds", 15)):
+    for title, least in _COLUMNS:
         table.add_column(Text(title, style="dim"), justify="right", min_width=least, no_wrap=True)
     for each in fleet.aircraft if verbose else fleet.aircraft[:_SHOWN]:
         table.add_row(
@@ -129,14 +131,18 @@ def _bad(fleet: Fleet, verbose: bool) -> Iterator[RenderableType]:
 
 
 def largest_motor(each: Aircraft) -> str:
-    """The largest component of the pooled motor vectors, with its scatter."""
-    pooled = [compass.pooled for compass in each.compasses if compass.pooled is not None]
+    """The largest component of the pooled motor vectors, mGauss, with its scatter and of what."""
+    pooled = [
+        (compass.pooled, compass.regressor)
+        for compass in each.compasses
+        if compass.pooled is not None
+    ]
     if not pooled:
         return "–"
-    worst = max(pooled, key=lambda one: float(abs(one.motor).max()))
+    worst, regressor = max(pooled, key=lambda one: float(abs(one[0].motor).max()))
     axis = int(abs(worst.motor).argmax())
     std = float(worst.covariance[axis, axis]) ** 0.5
-    return words.with_std(-float(worst.motor[axis]), std)
+    return f"{words.with_std(-float(worst.motor[axis]), std)} {quantity_of(regressor).per}"
 
 
 def _bound(each: Aircraft) -> float:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -12,9 +13,11 @@ import numpy as np
 from magcomp.fleet.flights import Flight
 from magcomp.judge.thresholds import Thresholds
 from magcomp.model import Grade, unit_of
+from magcomp.report import words
 
 _SETTINGS = slice(3, 12)
 _ALIKE = 1e-3
+_OF_ONE = re.compile(r"compass (?P<slot>\d+): (?P<text>.*)", re.DOTALL)
 
 
 class Attention(IntEnum):
@@ -48,6 +51,23 @@ class Finding:
 
     attention: Attention
     text: str
+
+
+def texts(findings: Iterable[Finding]) -> list[str]:
+    """What the findings say, once where it is the same of several compasses.
+
+    Examples
+    --------
+    >>> each = [Finding(Attention.ACT, f"compass {slot}: it drifts") for slot in (1, 3)]
+    >>> texts([*each, Finding(Attention.LOOK, "its board changed")])
+    ['compasses 1 and 3: it drifts', 'its board changed']
+    """
+    said: dict[str, list[int]] = {}
+    for finding in findings:
+        of_one = _OF_ONE.fullmatch(finding.text)
+        text = finding.text if of_one is None else of_one["text"]
+        said.setdefault(text, []).extend([] if of_one is None else [int(of_one["slot"])])
+    return [f"{words.compasses(slots)}: {text}" if slots else text for text, slots in said.items()]
 
 
 def scattering(slot: int, count: int, degrees: float, at: float, regressor: str) -> Finding:

@@ -379,4 +379,7 @@ class Connection:
 
     def _raise_failure(self) -> None:
         if self._failure is not None:
-            raise LinkError(f"The link to {self.address} failed.") from self._failure
+            raise LinkError(
+                f"The link to {self.address} must stay open; instead it failed "
+                f"({str(self._failure).rstrip('.')}). Look at cable and power, and begin again."
+            ) from self._failure

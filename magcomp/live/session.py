@@ -406,5 +406,7 @@ class LiveSession:
     def _known_vehicle(self) -> Vehicle:
         vehicle = self.connection.vehicle
         if vehicle is None:
-            raise LinkTimeoutError(f"No vehicle is on {self.connection.address}.")
+            raise LinkTimeoutError(
+                f"A vehicle must be on {self.connection.address}; instead none is heard yet."
+            )
         return vehicle

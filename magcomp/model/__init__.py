@@ -53,6 +53,7 @@ from magcomp.model.recording import (
     running_mean,
 )
 from magcomp.model.samples import (
+    LEANS_S,
     Control,
     Correction,
     InForce,
@@ -65,6 +66,7 @@ __all__ = [
     "CORRECTION_SIZE",
     "CURRENT",
     "DRIVE",
+    "LEANS_S",
     "MOTOR",
     "MOTORS",
     "OFFSET",

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import dataclasses
 from bisect import bisect_right
+from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from operator import attrgetter
+from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -201,7 +202,7 @@ class ParameterChange(NamedTuple):
     value: float
 
 
-_time = attrgetter("time")
+_time = itemgetter(0)
 
 
 @dataclass(frozen=True)
@@ -226,9 +227,9 @@ class ParameterHistory:
     )
 
     def __post_init__(self) -> None:
-        by_name: dict[str, list[ParameterChange]] = {}
+        by_name: defaultdict[str, list[ParameterChange]] = defaultdict(list)
         for change in sorted(self.changes, key=_time):
-            by_name.setdefault(change.name, []).append(change)
+            by_name[change[1]].append(change)
         frozen = {name: tuple(changes) for name, changes in by_name.items()}
         object.__setattr__(self, "_by_name", frozen)
 
@@ -324,6 +325,9 @@ class Recording:
         Messages that tell the attitude too, the better ones first, to what they tell.
     esc_currents
         Output, counted from 0, to the current in A of its speed controller, where it reports one.
+    forward
+        1 where a vehicle that can do both flies on its wings or goes over to or from them, 0 where
+        it hovers, from each time on, shape (n,); None where it does not say.
     """
 
     source: str
@@ -350,6 +354,7 @@ class Recording:
     attitude_source: str = ""
     other_attitudes: Mapping[str, Series] = dataclasses.field(default_factory=dict)
     esc_currents: Mapping[int, Series] = dataclasses.field(default_factory=dict)
+    forward: Series | None = None
 
     @property
     def esc_current(self) -> Series | None:

@@ -7,10 +7,23 @@ from functools import cached_property
 
 import numpy as np
 
-from magcomp.model.recording import BoolArray, FloatArray, IntArray, Series, running_mean
+from magcomp.model.numbers import median
+from magcomp.model.recording import (
+    BoolArray,
+    FloatArray,
+    IntArray,
+    Series,
+    interpolate,
+    running_mean,
+)
 
 BLUR_S = 0.2
 """A reading is a mean over a tenth of a second, and motors follow their outputs within two."""
+
+LEANS_S = (2.0, 8.0)
+"""How soon a lean that is held shows in the attitude: between these, for most filters."""
+
+_LEAST_STEP_S = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,6 +221,20 @@ class Readings:
     def __len__(self) -> int:
         return len(self.time)
 
+    @cached_property
+    def step(self) -> float:
+        """Usual time between two readings, seconds."""
+        steps = np.diff(self.time)
+        return max(float(median(steps)), _LEAST_STEP_S) if len(steps) else _LEAST_STEP_S
+
+    @cached_property
+    def usual_tilt(self) -> FloatArray:
+        """Medians of roll and pitch, radians, shape (2,)."""
+        if not len(self):
+            return np.zeros(2)
+        roll_and_pitch = Series(self.attitude.time, self.attitude.value[:, :2])
+        return median(interpolate(roll_and_pitch, self.time))
+
     def where(self, keep: BoolArray) -> Readings:
         """The rows for which ``keep`` is true."""
         return replace(
@@ -245,6 +272,9 @@ class Samples:
         Unit vector of gravity in body axes at that moment, shape (n, 3).
     down_rate
         Its change per second, shape (n, 3).
+    lean
+        Roll and pitch less what is usual of them, followed by a first-order low pass of each of
+        :data:`LEANS_S`: what acceleration does to attitude, radians, shape (n, 4).
     u
         Parts of the control quantity, shape (n, k).
     u_rate
@@ -262,6 +292,7 @@ class Samples:
     attitude: FloatArray
     down: FloatArray
     down_rate: FloatArray
+    lean: FloatArray
     u: FloatArray
     u_rate: FloatArray
     u_blur: FloatArray

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from magcomp import __version__
+from magcomp.align import on_lift_alone
 from magcomp.judge.judge import error_at
 from magcomp.model import (
     Analysis,
@@ -53,8 +54,10 @@ def check_object(
     recording: Recording, verdicts: Mapping[int, Verdict], regressor: str
 ) -> dict[str, Any]:
     """What ``magcomp check --json`` prints."""
+    left_out = on_lift_alone(recording)[1]
     return {
         **head(recording.source, recording.duration_s, recording.vehicle),
+        "notes": [left_out] if left_out else [],
         "compasses": [
             {
                 "compass": compass,

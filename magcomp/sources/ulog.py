@@ -117,6 +117,7 @@ def read_ulog(path: str | Path) -> Recording:
         format="ulog",
         battery=battery,
         esc_currents=quantities.esc_currents(),
+        forward=quantities.forward(),
         other_currents={n: each for n, each in batteries.items() if n != battery},
         raw_compasses=frozenset(n for n, each in compasses.items() if each.raw),
     )

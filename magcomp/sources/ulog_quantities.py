@@ -21,6 +21,7 @@ _FIX_3D = 3
 _OUTPUTS = 16
 _MOTORS = 12
 _ESCS = 8
+_ROTARY = 1
 _MOTOR_1 = 101
 """Number of the output function of motor 1."""
 _THRUST_TOPIC_ALONE = (1, 14)
@@ -184,6 +185,15 @@ class Quantities:
         else:
             return None
         return Series(self._said(topic), armed.astype(np.float64))
+
+    def forward(self) -> Series | None:
+        """1 where a VTOL flies on its wings or is in transition; None of any other vehicle."""
+        topic = self.log.topic("vehicle_status", "is_vtol", "vehicle_type", "in_transition_mode")
+        if topic is None or not topic.number("is_vtol").any():
+            return None
+        hovers = topic.number("vehicle_type") == _ROTARY
+        away = ~hovers | (topic.number("in_transition_mode") > 0)
+        return Series(self._said(topic), away.astype(np.float64))
 
     def _armed_at(self, time: FloatArray) -> BoolArray:
         armed = self.armed()

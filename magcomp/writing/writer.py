@@ -169,7 +169,8 @@ def fetch(
 
     run(reader, connection, Peer.of(vehicle), clock=clock, on_events=tell)
     if reader.failure:
-        hint = "" if reader.answered else f" ({autopilots.of(vehicle).deaf_hint()})"
+        hints = f"{autopilots.of(vehicle).deaf_hint()}; if it wants signed frames, --signing-key"
+        hint = "" if reader.answered else f" ({hints})"
         raise LinkTimeoutError(
             f"system {vehicle.system} must send its parameters; instead {reader.failure}{hint}"
         )

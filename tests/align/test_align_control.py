@@ -224,3 +224,29 @@ def test_a_current_that_the_monitor_smooths_is_rebuilt_as_it_was_before(constant
 
     assert slope(rebuilt.series) == pytest.approx(1.0, abs=0.02)
     assert abs(slope(told) - 1.0) > 0.04
+
+
+def test_a_smoothing_shorter_than_a_step_of_the_outputs_is_undone_too() -> None:
+    """Outputs ten times a second, a monitor that smooths by 0.06 s: 6 % of a slope if ignored."""
+    rng = np.random.default_rng(5)
+    time = np.arange(0.0, 180.0, 0.01)
+    walk = np.convolve(rng.normal(size=len(time)), np.hanning(60), "same")
+    thrust = np.clip(0.42 + 0.12 * walk / walk.std(), 0.1, 0.9)
+    told = outputs(time, thrust)
+    duty = (told.value[:, 0] - 1000.0) / 1000.0
+    true = 90.0 * duty**2
+    smooth = np.empty_like(true)
+    smooth[0] = true[0]
+    for row in range(1, len(true)):
+        smooth[row] = smooth[row - 1] + (true[row] - smooth[row - 1]) * (1.0 - np.exp(-0.01 / 0.06))
+    current = Series(time[::25], smooth[::25] + rng.normal(scale=0.1, size=len(time[::25])))
+    often = Series(time[::10], told.value[::10])
+    found = controls(replace(flying(180.0), current=current, throttle=None, outputs=often))
+    rebuilt = found[1].series
+    inside = (time > 1.0) & (time < 179.0)
+    rows = [
+        np.interp(time[inside] - shift, rebuilt.time, rebuilt.value)
+        for shift in np.arange(-0.15, 0.05, 0.01)
+    ]
+    best = max(rows, key=lambda row: np.corrcoef(row, true[inside])[0, 1])
+    assert np.polyfit(best, true[inside], 1)[0] == pytest.approx(1.0, abs=0.01)

@@ -10,8 +10,10 @@ from synthetic import INTERFERENCE
 from unequal import Unequal
 
 from magcomp.align.phases import on_lift_alone
-from magcomp.analysis.analyse import Options, analyse
+from magcomp.analysis.analyse import Options, analyse, check
 from magcomp.model import ParameterChange, ParameterHistory, Series
+from magcomp.report import as_json, as_text
+from magcomp.report.look import Look
 
 FROM, UNTIL = 60.0, 100.0
 PUSHED = np.array([-2.0, 1.5, 1.0])
@@ -53,6 +55,32 @@ def test_readings_and_current_of_forward_flight_are_left_out_and_said_so():
         assert not np.any((series.time > FROM) & (series.time < UNTIL))
         assert np.any(series.time < FROM - 2.0)
         assert np.any(series.time > UNTIL + 2.0)
+
+
+def test_a_firmware_that_says_when_it_flies_forward_is_believed():
+    """Told rarely: from each time on it is as was said last."""
+    told = Series(np.array([0.0, FROM, UNTIL]), np.array([0.0, 1.0, 0.0]))
+    silent = replace(quadplane(functions={}), forward=told)
+    copter = replace(silent, vehicle=replace(silent.vehicle, kind="copter"))
+    hover, words = on_lift_alone(copter)
+    assert words.startswith("the vehicle flies forward in 3")
+    for series in (hover.field[1], hover.current):
+        assert not np.any((series.time > FROM) & (series.time < UNTIL))
+        assert np.any(series.time < FROM - 2.0)
+        assert np.any(series.time > UNTIL + 2.0)
+    never = replace(copter, forward=Series(told.time, np.zeros(3)))
+    assert on_lift_alone(never) == (never, "")
+
+
+def test_a_check_says_that_forward_flight_is_left_out():
+    recording = quadplane()
+    verdicts = check(recording)
+    text = as_text.check_text(recording, verdicts, "current", Look())
+    assert "pusher drives the vehicle" in " ".join(text.split())
+    (note,) = as_json.check_object(recording, verdicts, "current")["notes"]
+    assert "holds for hovering" in note
+    copter = replace(recording, vehicle=replace(recording.vehicle, kind="copter"))
+    assert as_json.check_object(copter, verdicts, "current")["notes"] == []
 
 
 def test_a_pusher_beside_running_lift_motors_is_left_out_too():

@@ -293,7 +293,7 @@ def test_a_recording_has_no_room_for_the_truth():
         "source", "vehicle", "start_unix_s", "duration_s", "field", "attitude", "gyro", "accel",
         "throttle", "current", "voltage", "outputs", "position", "armed", "parameters", "report",
         "format", "battery", "other_currents", "applied", "raw_compasses", "attitude_source",
-        "other_attitudes", "esc_currents",
+        "other_attitudes", "esc_currents", "forward",
     }  # fmt: skip
     for name in ("flight", "sweep_current"):
         assert not any(n.startswith("SIM_") for n in recordings.recording(name).parameters.names)

@@ -162,6 +162,16 @@ def test_the_speed_controllers_currents_are_summed(recorded) -> None:
     assert found.attitude_source == "vehicle_attitude"
 
 
+@pytest.mark.parametrize(("is_vtol", "forward"), [(True, [0.0, 1.0, 1.0, 1.0]), (False, None)])
+def test_a_vtol_says_when_it_flies_on_its_wings(recorded, is_vtol, forward) -> None:
+    form = "uint64_t timestamp;uint8_t vehicle_type;bool is_vtol;bool in_transition_mode;"
+    writer = Writer(forms={**FORMS, "vehicle_status": form})
+    for n, (kind, transition) in enumerate([(1, False), (1, True), (2, False), (2, True)]):
+        writer.row("vehicle_status", n, kind, is_vtol, transition)
+    found = recorded(writer).forward
+    assert (None if found is None else found.value.tolist()) == forward
+
+
 def test_a_speed_controller_that_says_which_motor_it_drives_is_that_motors(recorded) -> None:
     writer = short_flight(1)
     writer.forms = {**writer.forms, "esc_report": ESC_REPORT_OF_FUNCTIONS}

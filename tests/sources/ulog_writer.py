@@ -12,6 +12,7 @@ START_US = 5_000_000
 
 _CODES = {
     "uint8_t": "B",
+    "bool": "?",
     "uint16_t": "H",
     "uint32_t": "I",
     "int32_t": "i",

@@ -14,6 +14,7 @@ from click.testing import CliRunner
 from scripted import press, screen, until
 from textual.widgets import Input
 from truth import FIXTURES
+from unequal import Unequal
 
 from magcomp.analysis import Options
 from magcomp.cli.app import app as command_line
@@ -22,6 +23,7 @@ from magcomp.fit import METHODS
 from magcomp.tui import fitting
 from magcomp.tui.fits import fit_rows
 from magcomp.tui.screens.dialogs import Confirm, Message
+from magcomp.tui.screens.fit import regressors
 from magcomp.tui.services import Simulation
 from magcomp.writing.files import read_parameter_file
 
@@ -97,6 +99,15 @@ async def test_every_option_can_be_changed_and_fits_again_at_once(tmp_path):
         assert pilot.app.work.options.end == 70.0
         shown = screen(pilot.app)
         assert "M method sweep R by throttle C compass 1 T time 10 … 70 s" in shown
+
+
+def test_what_is_offered_is_what_the_log_may_be_fitted_by():
+    flown = Unequal(seed=1).recording()
+    escs = {0: flown.current}
+    assert regressors(None) == ("auto", "current", "throttle")
+    assert regressors(replace(flown, outputs=None)) == ("auto", "current", "throttle")
+    assert regressors(flown) == ("auto", "current", "throttle", "motors")
+    assert regressors(replace(flown, esc_currents=escs))[-2:] == ("motors", "esc")
 
 
 async def test_a_fit_that_cannot_be_says_why_and_what_next_and_keeps_the_old_one(tmp_path):
@@ -184,6 +195,31 @@ async def test_every_method_is_reached_and_one_that_cannot_fit_does_not_end_the_
             if isinstance(app.screen, Message):
                 await press(pilot, "enter")
         assert sorted(tried) == sorted(METHODS)
+
+
+async def test_every_quantity_is_reached_and_one_that_cannot_be_fitted_does_not_end_the_round(
+    tmp_path, monkeypatch
+):
+    def fit(_recording, options, _progress):
+        if options.regressor in ("throttle", "motors"):
+            raise MissingDataError(f"{options.regressor} must be there; instead it is not")
+        return made.analysis(), made.pictures(made.analysis())
+
+    monkeypatch.setattr(fitting, "fit", fit)
+    app = scripted.app(tmp_path)
+    async with app.run_test() as pilot:
+        await until(pilot, lambda: app.choices)
+        work = made.work()
+        app.set_work(replace(work, recording=Unequal(seed=1).recording()))
+        app.action_go("fit")
+        await until(pilot, lambda: "Heading error" in screen(app))
+        tried = []
+        for _ in range(4):
+            await press(pilot, "r")
+            tried.append(app.asked.regressor)
+            if isinstance(app.screen, Message):
+                await press(pilot, "enter")
+        assert tried == ["current", "throttle", "motors", "auto"]
 
 
 async def test_the_report_of_what_is_shown_is_saved_and_told_of_on_leaving(tmp_path):

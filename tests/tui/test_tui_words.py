@@ -35,6 +35,7 @@ from magcomp.tui.widgets.bars import bar
 from magcomp.tui.widgets.coverage_map import LevelRow, LevelTable
 from magcomp.tui.widgets.heading_ring import HeadingRing, Ring
 from magcomp.tui.widgets.live_facts import Facts, LiveFacts, bound_words, sparkline, trend
+from magcomp.tui.widgets.plots import vector_words
 from magcomp.tui.work import Writing
 from magcomp.writing.events import Mismatch, Outcome, Reason, RollingBack, Standing, Written
 
@@ -239,6 +240,14 @@ def test_no_snapshot_is_posted_before_the_last_one_is_on_the_screen(monkeypatch)
     finally:
         watcher.close()
     assert not overtaken.is_set()
+
+
+@pytest.mark.parametrize("room", [32, 45, 80])
+def test_the_vector_below_its_picture_keeps_its_unit(room):
+    said = vector_words(made.result(1).fit, room)
+    assert said.endswith("per A")
+    assert len(said) <= room
+    assert said.startswith("f " if room == 32 else "forward ")
 
 
 def test_a_mark_is_forgotten_once_the_vehicle_has_moved_on():

@@ -135,7 +135,7 @@ def test_a_vehicle_without_parameters_is_one_sentence() -> None:
         fetch(link, QUAD, clock=clock)
     with pytest.raises(
         LinkTimeoutError,
-        match=r"answers no parameter request \(with SYSID_ENFORCE on.*--source-system",
+        match=r"no parameter request \(with SYSID_ENFORCE on.*--source-system; .*--signing-key",
     ):
         fetch(link, QUAD, ["COMPASS_MOTCT"], clock=clock)
 

@@ -12,14 +12,15 @@ from textual.widget import Widget
 from textual.widgets import ProgressBar, Static
 
 from magcomp.analysis import Options
+from magcomp.analysis.analyse import ESC
 from magcomp.fit import METHODS
-from magcomp.model import Analysis, Grade, quantity_of
+from magcomp.model import CURRENT, MOTORS, THROTTLE, Analysis, Grade, Recording
 from magcomp.report import words
 from magcomp.report.as_json import analysis_object
 from magcomp.report.plain import pilots_lines
 from magcomp.tui.fits import fit_rows, time_range
 from magcomp.tui.messages import OptionsChosen, TimeRangeWanted
-from magcomp.tui.pictures import AXIS_WORDS, CompassPicture
+from magcomp.tui.pictures import CompassPicture
 from magcomp.tui.screens.step import StepScreen
 from magcomp.tui.widgets.fits_table import FitsTable
 from magcomp.tui.widgets.heading_table import HeadingTable
@@ -39,7 +40,18 @@ _OPTION_KEYS = ("fit.method", "fit.regressor", "fit.compasses", "fit.time")
 
 _T = TypeVar("_T")
 
-REGRESSORS = ("auto", "current", "throttle")
+
+def regressors(recording: Recording | None) -> tuple[str, ...]:
+    """Control quantities that a recording may be fitted by, in the order in which R offers them.
+
+    Where what is needed for one of them is there; whether it tells the motors apart, the fit says.
+    """
+    offered = ["auto", CURRENT, THROTTLE]
+    if recording is not None and recording.current is not None and recording.outputs is not None:
+        offered.append(MOTORS)
+    if recording is not None and recording.esc_currents:
+        offered.append(ESC)
+    return tuple(offered)
 
 
 class FitScreen(StepScreen):
@@ -138,7 +150,7 @@ and C change method, regressor, time range and compasses, and fit again at once;
             self.call_after_refresh(self._focus_view)
         self._drawn = (shown, analysis)
         self.query_one(HeadingTable).show(shown.errors)
-        self.query_one(ShiftPlot).show(shown.shift)
+        self.query_one(ShiftPlot).show(shown.shift, shown.result.fit)
         self.query_one(UnexplainedPlot).show(shown.unexplained)
         self.query_one(VerdictText).show(shown.result, analysis.notes)
         rows = fit_rows(self.state.work.tried, analysis, self._compass)
@@ -149,10 +161,6 @@ and C change method, regressor, time range and compasses, and fit again at once;
             f"unseen {residual.held_out:.1f}"
         )
         self.query_one("#view-unexplained").border_subtitle = "x now   • corrected"
-        axes = zip(AXIS_WORDS, shown.result.fit.interference, strict=True)
-        each = "  ".join(f"{axis} {words.number(float(value))}" for axis, value in axes)
-        per = quantity_of(shown.result.fit.regressor).per
-        self.query_one("#view-shift").border_subtitle = f"{each}  {per}"
 
     def _pilots_line(self, analysis: Analysis) -> str:
         """What to do, in words without statistics."""
@@ -227,7 +235,9 @@ and C change method, regressor, time range and compasses, and fit again at once;
 
     def action_regressor(self) -> None:
         """Fit against the next control quantity."""
-        self._change(regressor=_after(REGRESSORS, self.state.work.options.regressor))
+        offered = regressors(self.state.work.recording)
+        # As with methods, one that cannot be fitted must not end the round.
+        self._change(regressor=_after(offered, self.state.asked.regressor))
 
     def action_compasses(self) -> None:
         """Fit all compasses, or one."""

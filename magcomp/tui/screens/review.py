@@ -73,7 +73,7 @@ class ReviewScreen(StepScreen):
         """Columns, and the focus on the table so that arrows scroll it."""
         table = self.query_one(ChangeTable)
         table.border_title = "Parameters that change"
-        for name, width in (("Parameter", 16), ("Old", 12), ("New", 13), ("", 14)):
+        for name, width in (("Parameter", 16), ("Old", 11), ("New", 14), ("", 14)):
             label = Text(name, justify="right" if name in ("Old", "New") else "left")
             table.add_column(label, key=name or "state", width=width)
         table.focus()

@@ -7,10 +7,13 @@ pilot who sees none, reads the same.
 from __future__ import annotations
 
 from textual.color import Color
+from textual.widget import Widget
 from textual_plotext import PlotextPlot
 
+from magcomp.model import MotorFit, quantity_of
+from magcomp.report import words
 from magcomp.report.shift import Shift
-from magcomp.tui.pictures import AXES, Unexplained, round_ticks
+from magcomp.tui.pictures import AXES, AXIS_WORDS, Unexplained, round_ticks
 
 AXIS_COLOURS = ("error", "success", "primary")
 """Of forward, right and down, as names in the theme; the letters say the same."""
@@ -71,17 +74,20 @@ take the shift out.
     def __init__(self, *, id: str | None = None) -> None:  # noqa: A002 - Textual's own name
         super().__init__(id=id)
         self._shift: Shift | None = None
+        self._fit: MotorFit | None = None
 
-    def show(self, shift: Shift) -> None:
-        """Draw one compass."""
-        self._shift = shift
+    def show(self, shift: Shift, fit: MotorFit) -> None:
+        """Draw one compass, and say its vector at the foot."""
+        self._shift, self._fit = shift, fit
         self.draw_plot()
 
     def draw_plot(self) -> None:
         """Draw with the colours and the size there are now."""
         shift = self._shift
-        if shift is None or not self.is_attached:
+        if shift is None or self._fit is None or not self.is_attached:
             return
+        if isinstance(self.parent, Widget):
+            self.parent.border_subtitle = vector_words(self._fit, self.size.width - 2)
         self.begin(shift.title)
         colours = [self.colour(name) for name in AXIS_COLOURS]
         for index, colour in enumerate(colours):
@@ -93,6 +99,17 @@ take the shift out.
         everything = [*shift.lines.flat, *shift.centres.flat, 0.0]
         self.ticks((0.0, float(shift.ends[1]) or 1.0), (min(everything), max(everything)))
         self.refresh()
+
+
+def vector_words(fit: MotorFit, room: int) -> str:
+    """``forward 1.124  right 0.446  down -1.764  per A``; with letters where there is less room."""
+    values = [words.number(float(value)) for value in fit.interference]
+    per = quantity_of(fit.regressor).per
+    whole, short = (
+        "  ".join([*(f"{name} {v}" for name, v in zip(names, values, strict=True)), per])
+        for names in (AXIS_WORDS, AXES)
+    )
+    return whole if len(whole) <= room else short
 
 
 class UnexplainedPlot(Picture):
