@@ -54,6 +54,7 @@ class _Tried:
     held_out: float
     added: FloatArray
     u: FloatArray
+    correction: Correction
 
 
 def forms(
@@ -102,6 +103,9 @@ def forms(
             if best is tried[0] or each.name == richest.name
             else left_deg(nearest(richest.added, each.u)[1], field, samples),
             is_best=each is best,
+            curve=_curve(fit.correction, each.correction, _top(whole))
+            if each.name == CURVED
+            else (),
         )
         for each in tried
     )
@@ -122,9 +126,12 @@ def left_deg(left: FloatArray, field: FloatArray, samples: Samples) -> float:
 def _curved(problem: Problem, samples: Samples) -> Problem:
     """The same against the current and its square: bent up, or down where it saturates."""
     series = problem.control.total
-    top = max(float(np.quantile(samples.total, 0.98)), 1e-9)
-    parts = np.column_stack([series.value, series.value**2 / top])
+    parts = np.column_stack([series.value, series.value**2 / _top(samples)])
     return replace(problem, control=replace(problem.control, series=Series(series.time, parts)))
+
+
+def _top(samples: Samples) -> float:
+    return max(float(np.quantile(samples.total, 0.98)), 1e-9)
 
 
 def _tried(name: str, problem: Problem, fit: MotorFit, base: Control | None = None) -> _Tried:
@@ -169,7 +176,18 @@ def _tried(name: str, problem: Problem, fit: MotorFit, base: Control | None = No
         ]
     )
     found = correction_at(start + solved(*whole))
-    return _Tried(name, found.motor.size, spread(unseen), found.added(samples.u), samples.u)
+    return _Tried(name, found.motor.size, spread(unseen), found.added(samples.u), samples.u, found)
+
+
+def _curve(fit: Correction, curved: Correction, top: float) -> tuple[tuple[float, ...], ...]:
+    """How the centre of the readings moves with the quantity, in the field that the fit corrects.
+
+    Three vectors: from the fit's centre at rest, per unit, and per unit squared.
+    """
+    back = fit.soft_iron @ np.linalg.inv(curved.soft_iron)
+    slope, bend = -(back @ curved.motor).T
+    rest = fit.soft_iron @ (fit.offset - curved.offset)
+    return tuple(tuple(vector.tolist()) for vector in (rest, slope, bend / top))
 
 
 def _parts(fold: IntArray) -> list[BoolArray]:

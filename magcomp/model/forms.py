@@ -22,6 +22,10 @@ class Form:
         but a hundredth of the readings are below it. NaN where there is nothing to compare with.
     is_best
         Whether it is the simplest that no other is clearly better than.
+    curve
+        Of a curved form, what the motors add to the corrected field along x, y and z: mGauss at
+        rest, per unit and per unit squared, beside the centre that the fit has at rest. Empty of
+        other forms.
     """
 
     name: str
@@ -29,6 +33,7 @@ class Form:
     held_out: float
     left_deg: float
     is_best: bool
+    curve: tuple[tuple[float, ...], ...] = ()
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import dataclasses
 from bisect import bisect_right
+from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from operator import attrgetter
+from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -201,7 +202,7 @@ class ParameterChange(NamedTuple):
     value: float
 
 
-_time = attrgetter("time")
+_time = itemgetter(0)
 
 
 @dataclass(frozen=True)
@@ -226,9 +227,9 @@ class ParameterHistory:
     )
 
     def __post_init__(self) -> None:
-        by_name: dict[str, list[ParameterChange]] = {}
+        by_name: defaultdict[str, list[ParameterChange]] = defaultdict(list)
         for change in sorted(self.changes, key=_time):
-            by_name.setdefault(change.name, []).append(change)
+            by_name[change[1]].append(change)
         frozen = {name: tuple(changes) for name, changes in by_name.items()}
         object.__setattr__(self, "_by_name", frozen)
 

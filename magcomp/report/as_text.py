@@ -28,6 +28,7 @@ from magcomp.model import (
 from magcomp.report import as_json, plain, tables, words
 from magcomp.report.ascii import in_words
 from magcomp.report.bars import BEFORE_AFTER, Row, bars
+from magcomp.report.bend import steps_of
 from magcomp.report.look import Look
 from magcomp.report.roles import roles
 
@@ -358,12 +359,28 @@ def evidence(analysis: Analysis, *, verbose: bool = True) -> Iterator[Renderable
     compared = [result for result in analysis.compasses if result.forms]
     if compared and (verbose or not all(result.forms[0].is_best for result in compared)):
         yield tables.forms(compared)
+    if verbose:
+        yield from _bends(analysis.compasses)
     yield Text()
     for why, numbers in _by_method(analysis.compasses).items():
         of = "" if len(numbers) == len(analysis.compasses) else f"{words.compasses(numbers)}: "
         yield _note(f"{of}{why}")
     for note in analysis.notes:
         yield _note(note)
+
+
+def _bends(results: Sequence[CompassResult]) -> Iterator[RenderableType]:
+    """What the motors add along their vector, straight as it is written and bent as it is."""
+    for result in results:
+        if (bend := steps_of(result)) is not None:
+            curve, straight = bend.along()
+            rows = [
+                Row(words.quantity(u, result.fit.regressor), (float(line), float(bent)))
+                for u, line, bent in zip(bend.u, straight, curve, strict=True)
+            ]
+            yield Text()
+            title = f"compass {result.fit.compass}"
+            yield bars(title, ("straight, mGauss", "as it bends"), rows, unit=" ")
 
 
 def _by_method(results: Sequence[CompassResult]) -> dict[str, list[int]]:

@@ -18,7 +18,7 @@ _AROUND = 34
 
 @dataclass(frozen=True)
 class Row:
-    """One control quantity: its name, and a value in degrees for each of the columns.
+    """One control quantity: its name, and a value for each of the columns.
 
     ``is_bound`` says that the first value is known from above only, ``is_marked`` that this is the
     row the sentences quote.
@@ -35,9 +35,10 @@ def bars(
     columns: tuple[str, str],
     rows: Sequence[Row],
     styles: tuple[str, str] = BEFORE_AFTER,
+    unit: str = "°",
 ) -> ByWidth:
     """A small plot: a line a control quantity, two bars a line, all to one scale."""
-    return ByWidth(lambda width: lines(title, columns, rows, styles, width))
+    return ByWidth(lambda width: lines(title, columns, rows, styles, width, unit))
 
 
 def lines(
@@ -46,6 +47,7 @@ def lines(
     rows: Sequence[Row],
     styles: tuple[str, str],
     width: int,
+    unit: str = "°",
 ) -> Iterator[Text]:
     """The plot's lines, none longer than ``width`` columns, from 60."""
     length = min(_WIDEST, (width - _AROUND) // 2)
@@ -57,7 +59,7 @@ def lines(
         line = Text(f"{row.label:>12}", style="bold" if row.is_marked else "dim")
         for index, (value, style) in enumerate(zip(row.values, styles, strict=True)):
             sign = "≤" if row.is_bound and index == 0 else " "
-            line.append(f"{sign + f'{value:.1f}':>8}°  ", style="not bold not dim")
+            line.append(f"{sign + f'{value:.1f}':>8}{unit}  ", style="not bold not dim")
             drawn = bar(value, largest, length)
             line.append(drawn if index else f"{drawn:<{length}}", style=f"not bold not dim {style}")
         yield line

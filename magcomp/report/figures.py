@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from magcomp.model import BoolArray, CompassResult, FloatArray
+from magcomp.report.bend import bend_of
 from magcomp.report.evidence import TURN_SECTORS, CompassPlots
 from magcomp.report.figure import (
     AFTER,
@@ -148,11 +149,27 @@ def shift(result: CompassResult, quantity: Quantity) -> Figure:
                 "hovertemplate": f"%{{x:.1f}} {quantity.unit}: %{{y:.1f}} mGauss",
             }
         )
+    bend = bend_of(result)
+    if bend is not None:
+        for index, name in enumerate(AXIS_NAMES):
+            data.append(
+                line(
+                    quantity.values(bend.u),
+                    rounded(bend.curve[:, index], 2),
+                    f"{name}, bent",
+                    AXIS_COLOURS[index],
+                    dash="dot",
+                    legendgroup=name,
+                    hoverinfo="skip",
+                )
+            )
+    bends = "" if bend is None else "; the dotted curves are what the readings follow better"
     return Figure(
         "shift",
         "What the motors add",
         "Each point is the shift measured at one level with its 95 % error bar, each line the "
-        "fitted interference; points on their lines mean that one number per axis is enough.",
+        "fitted interference; points on their lines mean that one number per axis is enough"
+        f"{bends}.",
         data,
         flat(axis(quantity.title, rangemode="tozero"), axis("shift of the field (mGauss)")),
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from itertools import repeat
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -205,13 +206,14 @@ def parameters(messages: Messages, autopilot: str, simulation: bool) -> list[Par
     time, table = messages[Message.PARAM_VALUE]
     how = encoding(autopilot, capabilities(messages))
     value = decode_values(table["param_value"], table["param_type"], how)
-    rows = zip(time.tolist(), text(table["param_id"]), value.tolist(), strict=True)
-    # tuple.__new__ spares a Python call for each of a log's thousand parameters.
-    return [
-        tuple.__new__(ParameterChange, row)
-        for row in rows
-        if row[1].startswith(_SIMULATION_PREFIX) is simulation
-    ]
+    names = text(table["param_id"])
+    rows = zip(time.tolist(), names, value.tolist(), strict=True)
+    # Nothing here is a Python call for each of a log's thousand parameters.
+    changes = map(tuple.__new__, repeat(ParameterChange), rows)
+    simulated = {name for name in set(names) if name.startswith(_SIMULATION_PREFIX)}
+    if not simulated and not simulation:
+        return list(changes)
+    return [change for change in changes if (change[1] in simulated) is simulation]
 
 
 def holds_whole_list(messages: Messages) -> bool:

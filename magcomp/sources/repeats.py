@@ -11,7 +11,6 @@ from magcomp.sources.clock import NO_STAMP
 
 # Odd, so that no two keys are mixed alike; large, so that neighbouring ones end far apart.
 _MIX = np.int64(0x1E3779B97F4A7C15)
-_DRAWERS = 2
 
 
 def repeated(frames: Frames, stamp: OffsetArray) -> MaskArray:
@@ -49,22 +48,9 @@ def repeated(frames: Frames, stamp: OffsetArray) -> MaskArray:
 
 def _sharing(mixture: OffsetArray) -> NDArray[np.intp]:
     """Rows whose number stands in other rows too, increasing, shape (k,)."""
-    n = len(mixture)
-    # Rows in one drawer may be equal; those alone in theirs are not, and are most.
-    bits = (_DRAWERS * n).bit_length()
-    drawer = (mixture.view(np.uint64) >> np.uint64(64 - bits)).astype(np.int32)
-    last = np.zeros(1 << bits, dtype=np.int32)
-    number = np.arange(n, dtype=np.int32)
-    last[drawer] = number
-    shared = np.zeros(1 << bits, dtype=bool)
-    shared[drawer[last[drawer] != number]] = True
-    rows = np.flatnonzero(shared[drawer])
-    order = rows[np.argsort(mixture[rows], kind="stable")]
-    same = mixture[order][1:] == mixture[order][:-1]
-    twice = np.zeros(len(order), dtype=bool)
-    twice[1:] |= same
-    twice[:-1] |= same
-    return np.sort(order[twice])
+    ordered = np.sort(mixture)
+    shared = ordered[1:][ordered[1:] == ordered[:-1]]
+    return np.flatnonzero(np.isin(mixture, shared)) if len(shared) else np.zeros(0, dtype=np.intp)
 
 
 def _seen_before(key: OffsetArray, content: OffsetArray) -> MaskArray:

@@ -166,6 +166,14 @@ def test_the_simplest_form_that_explains_the_flight_is_the_best():
 def test_a_field_that_bends_with_the_current_is_seen_and_weighed():
     tried, best = best_of(replace(ALIKE, bend=3.0, swing=12.0))
     assert best == "curved current"
+    _, slope, bend = np.array(tried["curved current"].curve)
+    u = np.linspace(10.0, 40.0, 7)
+    # 3 mGauss per A and per 50 A, along x.
+    true = np.outer(u, INTERFERENCE) + np.outer(3.0 * u**2 / 50.0, [1.0, 0.0, 0.0])
+    off = np.outer(u, slope) + np.outer(u**2, bend) - true
+    # A straight line would be off by 9 mGauss.
+    assert np.abs(off - off.mean(axis=0)).max() < 3.0
+    assert tried[CURRENT].curve == ()
     assert 0.5 < tried[CURRENT].left_deg < 10.0
 
 
