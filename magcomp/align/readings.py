@@ -18,7 +18,6 @@ from magcomp.model import (
     Readings,
     Recording,
     Series,
-    median,
 )
 
 PARAMETER_SETTLE_S = 1.5
@@ -30,6 +29,9 @@ ARMED_ENOUGH_S = 30.0
 SHORT_PAUSE_S = 6.0
 """A pause between two armed stretches in which nobody carries a vehicle about: of motor tests."""
 
+
+_LEAST_GAP_S, _GAP_STEPS = 0.5, 2.5
+_NEAR_STEPS = 16
 
 MOST_READINGS = 20_000
 """Half an hour at 10 Hz. More are thinned before a fit: the bound of an hour's flight is that of
@@ -196,11 +198,18 @@ def in_gap(time: FloatArray, known: FloatArray) -> BoolArray:
     """
     if len(known) < 2:
         return np.zeros(len(time), dtype=bool)
-    after = np.clip(np.searchsorted(known, time), 1, len(known) - 1)
-    width = known[after] - known[after - 1]
-    limit = max(0.5, 2.5 * float(median(np.diff(known))))
-    outside = (time < known[0] - limit) | (time > known[-1] + limit)
-    return np.asarray((width > limit) | outside)
+    step = np.diff(known)
+    limit = np.maximum(_LEAST_GAP_S, _GAP_STEPS * _usual(step))
+    after = np.clip(np.searchsorted(known, time), 1, len(step))
+    outside = (time < known[0] - limit[0]) | (time > known[-1] + limit[-1])
+    return np.asarray((step[after - 1] > limit[after - 1]) | outside)
+
+
+def _usual(step: FloatArray) -> FloatArray:
+    """Median of the steps near each, same shape: a stream may be asked for more often later on."""
+    near = -(-len(step) // max(1, len(step) // _NEAR_STEPS))
+    padded = np.append(step, np.repeat(step[-1:], -len(step) % near)).reshape(-1, near)
+    return np.repeat(np.median(padded, axis=1), near)[: len(step)]
 
 
 def _usable_state(time: FloatArray, armed: Series | None) -> BoolArray:

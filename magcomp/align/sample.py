@@ -57,7 +57,7 @@ def sample(
     down, down_rate = gravity_and_rate(*attitude[:, :2].T, *_rate(tilt, measured).T)
     later = lags.regressor + readings.applied_later if lags.applied is None else lags.applied
     applied = readings.time - later
-    raw, raw_rate, raw_pull = _undo(readings, in_force, applied)
+    raw, raw_rate = _undo(readings, in_force, applied)
     u = _columns(interpolate(control.series, commanded))
     return Samples(
         compass=readings.compass,
@@ -65,7 +65,6 @@ def sample(
         time=readings.time,
         raw=raw,
         raw_rate=raw_rate,
-        raw_pull=raw_pull,
         present=_as_now(readings, raw, in_force, applied),
         attitude=attitude,
         down=down,
@@ -101,16 +100,15 @@ def _rate(series: Series, time: FloatArray) -> FloatArray:
 
 def _undo(
     readings: Readings, controls: Mapping[str, Control], applied: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Raw field, its change per second of lag and that per unit of u, each of shape (n, 3)."""
-    nothing = np.zeros_like(readings.reported)
+) -> tuple[FloatArray, FloatArray]:
+    """Raw field and its change per second of regressor lag, both of shape (n, 3)."""
     if not readings.corrected:
-        return readings.reported, nothing, nothing
+        return readings.reported, np.zeros_like(readings.reported)
     if readings.told_offset is not None and readings.told_motor is not None:
         raw = _undo_told(readings, readings.told_offset, readings.told_motor)
-        return raw, nothing, nothing
+        return raw, np.zeros_like(raw)
     raw = np.empty_like(readings.reported)
-    raw_rate, raw_pull = np.zeros_like(raw), np.zeros_like(raw)
+    raw_rate = np.zeros_like(raw)
     for index, stretch in enumerate(readings.in_force):
         rows = readings.stretch == index
         if not rows.any():
@@ -130,9 +128,8 @@ def _undo(
             field = field - added(interpolate(series, applied[rows]))
             # The derivative of −MOT·u(t − applied) by applied is +MOT·u̇.
             raw_rate[rows] = added(_rate(series, applied[rows])) @ inverse.T
-            raw_pull[rows] = -inverse @ stretch.correction.vector
         raw[rows] = field @ inverse.T - stretch.correction.offset
-    return raw, raw_rate, raw_pull
+    return raw, raw_rate
 
 
 def _undo_told(readings: Readings, told_offset: FloatArray, told_motor: FloatArray) -> FloatArray:

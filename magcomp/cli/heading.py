@@ -123,12 +123,14 @@ def heading(
     if seconds is not None:
         raise UsageError("--seconds must come with a live vehicle; instead received it with a log")
     log = Path(source)
-    recording, correction, origin = _correction(log, compass, parameters, in_force, selection)
+    recording, correction, origin, form = _correction(log, compass, parameters, in_force, selection)
     made = track(
         recording,
         compass,
         correction.correction,
         correction.regressor,
+        exponent=correction.exponent,
+        origin=form,
         gravity=gravity,
         start=selection.start,
         end=selection.end,
@@ -145,8 +147,8 @@ def heading(
 
 def _correction(
     log: Path, compass: int, parameters: Path | None, in_force: bool, selection: Selection
-) -> tuple[Recording, InForce, str]:
-    """The recording, what to correct it by, and where that comes from in words."""
+) -> tuple[Recording, InForce, str, str]:
+    """The recording, what to correct it by, where that comes from, and by what, in words."""
     if parameters is None and not in_force:
         options = Options(compass, start=selection.start, end=selection.end)
         recording, analysis = fit_log(log, options, selection)
@@ -157,14 +159,15 @@ def _correction(
         return (
             recording,
             InForce(fit.correction, fit.regressor),
-            (f"a fit of this log ({result.verdict.grade.value})"),
+            f"a fit of this log ({result.verdict.grade.value})",
+            fit.origin,
         )
     recording = read_log(log, selection)
     autopilot, values = autopilots.of(recording), recording.parameters.latest
     if parameters is None:
-        return recording, autopilot.in_force(values, compass), "the log's own parameters"
+        return recording, autopilot.in_force(values, compass), "the log's own parameters", ""
     chosen = _chosen(parameters, [autopilot])
-    return recording, autopilot.in_force({**values, **chosen}, compass), str(parameters)
+    return recording, autopilot.in_force({**values, **chosen}, compass), str(parameters), ""
 
 
 def _chosen(parameters: Path, known: Sequence[Autopilot]) -> Mapping[str, float]:

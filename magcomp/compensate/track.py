@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
-from magcomp.align import controls, expected_earth, readings, reported, to_undo
+from magcomp.align import (
+    controls,
+    currents_of_motors,
+    expected_earth,
+    readings,
+    reported,
+    to_undo,
+)
 from magcomp.compensate.compensator import Compensator
 from magcomp.compensate.fusion import Fusion, Motion, Reading, Tuning, fuse
 from magcomp.errors import MissingDataError
@@ -17,6 +24,8 @@ from magcomp.fit.flight import estimate_lags
 from magcomp.geometry import gravity_direction, heading
 from magcomp.model import (
     CURRENT,
+    DRIVE,
+    MOTORS,
     Control,
     Correction,
     FloatArray,
@@ -24,6 +33,7 @@ from magcomp.model import (
     Samples,
     Series,
     interpolate,
+    quantity_of,
 )
 
 Gravity = Literal["attitude", "accelerometer"]
@@ -69,6 +79,8 @@ def track(
     correction: Correction,
     regressor: str | None,
     *,
+    exponent: float = 1.0,
+    origin: str = "",
     tuning: Tuning | None = None,
     gravity: Gravity = "attitude",
     start: float = -np.inf,
@@ -86,6 +98,10 @@ def track(
         From a fit or from parameters.
     regressor
         The control quantity its motor vector belongs to; None where that vector is zero.
+    exponent
+        The control quantity is raised to it; see :class:`magcomp.model.InForce`.
+    origin
+        Which form of the control quantity was fitted; see :class:`magcomp.model.MotorFit`.
     tuning
         Of the fusion.
     gravity
@@ -108,19 +124,30 @@ def track(
     earth = expected_earth(recording)
     new = readings(recording, compass, start=start, end=end)
     found = controls(recording)
-    forms = [control for control in found if control.kind == regressor]
+    in_force = to_undo(recording, found)
     if regressor is None:
         forms = [Control(CURRENT, Series(new.time[:1], np.zeros(1)), "no motor correction")]
+    else:
+        of_motors = currents_of_motors(recording) if regressor == MOTORS else ()
+        drive = [in_force[DRIVE]] if DRIVE in in_force else []
+        each = (*found, *of_motors, *drive)
+        forms = [_raised(one, exponent) for one in each if one.kind == regressor]
     if not forms:
         raise MissingDataError(
             f"{recording.source} must hold the {regressor} that the correction of compass "
             f"{compass} multiplies; instead it holds {', '.join(reported(found)) or 'neither'}"
+            f"{quantity_of(regressor).how_to_have}"
         )
+    forms = [one for one in forms if one.origin == origin] or forms
     with solvable(compass):
-        in_force = to_undo(recording, found)
         problem = best_form([Problem(new, form, in_force, earth) for form in forms])
         lags, _ = estimate_lags(problem, correction)
     samples = problem.sample(lags)
+    if problem.control.parts > 1:
+        # A compensator multiplies one quantity: what the motors' parts add is in the readings then.
+        inside = np.linalg.solve(correction.soft_iron, correction.added(samples.u).T).T
+        samples = replace(samples, raw=samples.raw + inside)
+        correction = replace(correction, motor=np.zeros(3))
     compensator = Compensator(correction, earth.declination)
     roll, pitch = samples.attitude[:, 0], samples.attitude[:, 1]
     _, corrected = compensator.correct_all(samples.raw, samples.total, roll, pitch)
@@ -134,6 +161,16 @@ def track(
         regressor_lag_s=lags.regressor,
         declination=earth.declination,
     )
+
+
+def _raised(control: Control, exponent: float) -> Control:
+    """What a correction multiplies: a quantity to a power."""
+    if control.kind != DRIVE:
+        return control
+    series = control.series
+    raised = Series(series.time, np.maximum(series.value, 0.0) ** exponent)
+    # Under a name of its own: what was in force is undone by the quantity as it was told.
+    return replace(control, kind=MOTORS, series=raised)
 
 
 def _fused(

@@ -132,7 +132,6 @@ def _columns(samples: Samples, parameters: FloatArray) -> FloatArray:
     columns[0] = _dot(axes, (inverse @ (corrected - earth))[:, None])
     columns[0] += np.tensordot(parameters[NUISANCE], slopes[NUISANCE], axes=1)
     columns[1] = np.tensordot(correction.vector, pulled, axes=1)
-    columns[1] += _dot(axes, _across(samples.raw_pull)[:, None])
     return columns
 
 

@@ -36,6 +36,7 @@ _LEAST_SIGMA = 3.5
 _BLOCK_S = 15.0
 _USUAL_DRIFT_MGAUSS = 3.0
 _WIDEST = 0.1
+_GRID = 21
 
 
 @dataclass(frozen=True)
@@ -163,8 +164,8 @@ def departures_of(problem: Problem, fit: MotorFit, lags: Lags) -> tuple[Departur
     share = np.clip(samples.total / top, 0.0, 2.0)
     wide = _WIDEST * fit.strength
     curved, covariance, gain = linear.taken_up(weight[1] * share, wide)
-    # The bow of q·s² over 0 … 1 departs from its best line by q/8.
-    found = [_departure("curve", curved / 8, covariance / 64, gain, horizontal, np.nan)]
+    bow = _bow(share)
+    found = [_departure("curve", bow * curved, bow**2 * covariance, gain, horizontal, np.nan)]
     steps = [samples.time > t for t in np.quantile(samples.time, _SPLITS)]
     moments = np.quantile(samples.time, _SPLITS)
     earth = linear.slopes[[STRENGTH, SIN_DIP]]
@@ -177,6 +178,22 @@ def departures_of(problem: Problem, fit: MotorFit, lags: Lags) -> tuple[Departur
         found.append(max(tried, key=lambda d: d.gain))
     found.append(_wander(linear, samples.time, weight[0], horizontal))
     return tuple(found)
+
+
+def _bow(share: FloatArray) -> float:
+    """How far s² departs between 0 and 1 from the line that fits it best at s, shape (n,).
+
+    Examples
+    --------
+    A vehicle that hovers shows the bow where it hovers, and is off by more at rest:
+
+    >>> even, hovers = np.linspace(0.0, 1.0, 101), np.linspace(0.5, 1.0, 101)
+    >>> round(_bow(even), 2), round(_bow(hovers), 2)
+    (0.16, 0.54)
+    """
+    line = np.polynomial.Polynomial.fit(share, share**2, 1)
+    grid = np.linspace(0.0, 1.0, _GRID)
+    return float(np.abs(grid**2 - line(grid)).max())
 
 
 def _weighted(problem: Problem, values: FloatArray, slopes: FloatArray) -> _Linear:

@@ -12,12 +12,15 @@ from magcomp.judge.constancy import Departure, departures_of
 from magcomp.judge.evidence import used_lags
 from magcomp.judge.finding import Finding
 from magcomp.judge.thresholds import Thresholds
-from magcomp.model import Grade, MotorFit, Samples
+from magcomp.model import Grade, MotorFit, Samples, quantity_of
 
 _WEAKEST_SHARE, _STRONGEST_SHARE = 0.35, 2.5
 """Hard iron of any size a compass still works with keeps its median field between these shares."""
 
 _DIP_WIDTHS = 4.0
+
+_TOO_FEW_FOR_A_LINE = 2
+_TWO_SIDED = 1.96
 
 _DRIFTS = 1.5
 """A step of so many times the limit is no drift whatever the bound."""
@@ -53,9 +56,10 @@ def on_constancy(
     """
     if fit.method == "sweep":
         return
+    every = departures_of(problem, fit, used_lags(fit))
     found = [
         departure
-        for departure in departures_of(problem, fit, used_lags(fit))
+        for departure in every
         if departure.is_plain and departure.degrees > _tolerated(departure, limits, bound)
     ]
     if found:
@@ -64,6 +68,32 @@ def on_constancy(
         yield Finding(
             Grade.MARGINAL if likeliest.degrees < limits.marginal_deg else Grade.REJECTED,
             _words(likeliest, problem.control.kind),
+        )
+    elif fit.method == "levels" and len(fit.levels) == _TOO_FEW_FOR_A_LINE:
+        yield from _on_two_levels(fit, every, limits, bound)
+
+
+def _on_two_levels(
+    fit: MotorFit, departures: tuple[Departure, ...], limits: Thresholds, bound: float
+) -> Iterator[Finding]:
+    """Whether a bend between two levels, through which a straight line always goes, is ruled out.
+
+    The bow of a square between two levels is a quarter of what lies between them: more is no motor.
+    """
+    low, high = sorted(level.u for level in fit.levels)
+    length = float(np.linalg.norm(fit.correction.vector)) * (high - low)
+    horizontal = float(np.sqrt(max(fit.strength**2 - fit.vertical**2, 1.0)))
+    bow = float(np.degrees(length / 4.0 / horizontal))
+    for each in departures:
+        if each.kind == "curve":
+            bow = min(bow, each.degrees + _TWO_SIDED * each.degrees_std)
+    if np.hypot(bound, bow) > limits.good_deg:
+        in_words = quantity_of(fit.regressor).in_sentence
+        yield Finding(
+            Grade.MARGINAL,
+            f"only {in_words(low)} and {in_words(high)} were held, and nothing shows that the "
+            f"shift follows a straight line between them: hold {in_words((low + high) / 2)} too, "
+            "and turn as much there",
         )
 
 

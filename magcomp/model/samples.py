@@ -264,9 +264,6 @@ class Samples:
     raw_rate
         Change of ``raw`` per second by which the motor correction that was in force is taken to
         have been applied later, shape (n, 3).
-    raw_pull
-        Change of ``raw`` by one unit of u, by which the motor correction that was in force was
-        undone, shape (n, 3).
     present
         Field as the correction now in force corrects it, mGauss, shape (n, 3).
     attitude
@@ -291,7 +288,6 @@ class Samples:
     time: FloatArray
     raw: FloatArray
     raw_rate: FloatArray
-    raw_pull: FloatArray
     present: FloatArray
     attitude: FloatArray
     down: FloatArray

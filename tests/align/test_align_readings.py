@@ -80,6 +80,19 @@ def test_slow_attitude_is_no_gap(recording):
     assert len(readings(slow, 1)) > 0.95 * len(readings(recording, 1))
 
 
+@pytest.mark.parametrize("often_last", [True, False])
+def test_what_is_asked_for_more_often_later_was_no_gap_before(recording, often_last):
+    attitude = recording.attitude
+    middle = attitude.time[-1] / 2.0
+    seldom = np.arange(len(attitude)) % 25 == 0
+    keep = np.where((attitude.time > middle) == often_last, True, seldom)
+    keep &= (attitude.time < 10.0) | (attitude.time > 13.0)
+    changed = replace(recording, attitude=Series(attitude.time[keep], attitude.value[keep]))
+    kept = readings(changed, 1)
+    assert len(kept) > 0.9 * len(readings(recording, 1))
+    assert not np.any((kept.time > 10.6) & (kept.time < 12.4))
+
+
 def test_readings_near_a_change_of_calibration_are_left_out():
     changed = (ParameterChange(30.0, "COMPASS_OFS_X", 10.0),)
     kept = readings(Flown(seconds=60.0, changed=changed).recording(), 1)

@@ -1,6 +1,7 @@
 """``magcomp heading``: raw, corrected and fused heading of a log, and the error of each."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,11 +9,15 @@ from logs_made_of_logs import COMPASSES as GYRO
 from logs_made_of_logs import CURRENT, SWEEP, THROTTLE, frames, write
 from once import analyse
 from truth import FIXTURES
+from unequal import VECTORS, Unequal
 
+from magcomp import autopilots
 from magcomp.analysis import Options
 from magcomp.cli.app import run
 from magcomp.compensate import Tuning, track
+from magcomp.errors import MissingDataError
 from magcomp.experiments.motion import accuracy
+from magcomp.geometry import wrap_angle
 from magcomp.sources import read
 from magcomp.sources.truth import read_truth
 
@@ -153,3 +158,46 @@ def test_the_fusion_is_calmer_than_the_compass_alone():
     alone = accuracy(truth, made.time, made.corrected)
     fused = accuracy(truth, made.fused.time, made.fused.value)
     assert fused.rms < 0.5 * alone.rms
+
+
+# --- motor by motor --------------------------------------------------------------------------
+
+VEHICLE = Unequal(seed=1, seconds=70.0, exponent=1.5)
+LAW = {
+    f"COMPASS_PMOT{motor}_{axis}": -40.0 / 25.0**1.5 * value
+    for motor, vector in enumerate(VECTORS, start=1)
+    for axis, value in zip("XYZ", vector.tolist(), strict=True)
+}
+"""A motor draws 40 A · (duty · volts / 25) to the power of 1.5, so this is exactly right."""
+IN_FORCE = {"COMPASS_PMOT_EN": 1.0, "COMPASS_PMOT_EXP": 1.5, **LAW}
+
+
+def off_deg(time, found):
+    """From the true heading, degrees, root mean square."""
+    true = VEHICLE.attitude_at(time)[:, 2]
+    return float(np.degrees(np.sqrt(np.mean(wrap_angle(found - true) ** 2))))
+
+
+def test_a_correction_motor_by_motor_in_force_leaves_the_reported_heading_as_it_is():
+    recording = replace(VEHICLE, per_motor=IN_FORCE).recording()
+    force = autopilots.of(recording).in_force(recording.parameters.latest, 1)
+    made = track(recording, 1, force.correction, force.regressor, exponent=force.exponent)
+    apart = np.degrees(wrap_angle(made.corrected - made.reported))
+    assert np.sqrt(np.mean(apart**2)) < 0.5
+    straight = track(recording, 1, force.correction, force.regressor)
+    other = np.degrees(wrap_angle(straight.corrected - straight.reported))
+    assert np.sqrt(np.mean(other**2)) > 2.0
+    with pytest.raises(MissingDataError, match="SERVO_OUTPUT_RAW"):
+        track(replace(recording, voltage=None), 1, force.correction, force.regressor)
+
+
+def test_a_fit_motor_by_motor_corrects_by_every_motors_current():
+    recording = VEHICLE.recording()
+    by_motor, by_one = (
+        analyse(recording, Options(regressor=kind)).compasses[0].fit
+        for kind in ("motors", "current")
+    )
+    found = track(recording, 1, by_motor.correction, "motors", origin=by_motor.origin)
+    plain = track(recording, 1, by_one.correction, "current")
+    assert off_deg(found.time, found.corrected) < 0.5 * off_deg(plain.time, plain.corrected)
+    assert off_deg(found.time, found.corrected) < 1.5

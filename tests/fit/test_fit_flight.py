@@ -12,7 +12,7 @@ from magcomp.autopilots import ardupilot
 from magcomp.earth import EarthField
 from magcomp.errors import FitRejectedError, MissingDataError, UsageError
 from magcomp.fit import Problem, fit
-from magcomp.fit.field_model import SIZE, lags_of, rows_of, strength_and_dip
+from magcomp.fit.field_model import SIZE, lags_of, strength_and_dip
 from magcomp.fit.flight import TRUSTED_OFFSET_MGAUSS, TRUSTED_SOFT_IRON, is_physical, prior
 from magcomp.model import MotorFit, Series, pack
 
@@ -139,32 +139,6 @@ def test_the_stated_derivatives_are_those_of_the_residuals(compensated):
         measured = (residuals(at + shift)[0] - residuals(at - shift)[0]) / (2 * step)
         error = np.abs(measured - stated[:, :, index])[inside]
         assert error.max() <= 0.03 * np.abs(measured).max() + 1e-6, index
-
-
-@pytest.mark.parametrize("compensated", [False, True], ids=["off", "current in force"])
-def test_a_current_told_wrong_moves_the_residuals_by_what_was_undone_too(compensated):
-    """Where the compensation in force is right, an error of the current cancels in its undoing."""
-    in_force = None
-    if compensated:
-        in_force = {"COMPASS_MOTCT": 2.0, **ardupilot.correction_parameters(EXACT, 1, 1.0)}
-    problem = Flown(in_force=in_force, noise=0.0, seconds=60.0).problem()
-    at = prior(problem, 4).mean
-    at[:12] = pack(EXACT)
-
-    def off(by: float) -> Problem:
-        control = replace(
-            problem.control,
-            series=replace(problem.control.series, value=problem.control.series.value + by),
-        )
-        return Problem(problem.readings, control, {control.kind: control}, problem.earth)
-
-    def rows(by: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        return rows_of(off(by).sample(lags_of(at)), at, None)
-
-    measured = (rows(0.05)[0] - rows(-0.05)[0]) / 0.1
-    stated = rows(0.0)[2]
-    assert np.allclose(stated, measured, atol=0.02)
-    assert np.abs(stated).max() < 0.01 if compensated else np.abs(stated).max() > 1.0
 
 
 # --- what rotating, scaling and shuffling do --------------------------------------------------

@@ -166,6 +166,35 @@ def test_a_plain_departure_from_the_model_is_told(monkeypatch, degrees, std, exp
 
 
 @pytest.mark.parametrize(
+    ("held", "mgauss_per_a", "bend_deg", "bound", "expected"),
+    [
+        ((2.0, 42.0), 1.2, 4.0, 0.5, MARGINAL),
+        ((2.0, 42.0), 0.6, 4.0, 0.5, GOOD),
+        ((2.0, 42.0), 0.6, 4.0, 1.8, MARGINAL),
+        ((2.0, 42.0), 1.2, 0.5, 0.5, GOOD),
+        ((2.0, 22.0, 42.0), 1.2, 4.0, 0.5, GOOD),
+    ],
+    ids=["strong motors", "weak motors", "weak and unsure", "ruled out", "three levels"],
+)
+def test_two_levels_do_not_show_that_the_shift_is_straight(
+    monkeypatch, held, mgauss_per_a, bend_deg, bound, expected
+):
+    """A quarter of 40 A × 1.2 mGauss is 12, or 2.7° of 250 mGauss horizontal; of 0.6, 1.4°."""
+    departure = Departure("curve", bend_deg / 2, bend_deg / 4, 5.0, float("nan"), 1.0)
+    monkeypatch.setattr(whole, "departures_of", lambda *_: (departure,))
+    monkeypatch.setattr(whole, "used_lags", lambda _: None)
+    problem = SimpleNamespace(control=SimpleNamespace(kind=CURRENT))
+    of = fit(
+        "levels",
+        levels=tuple(SimpleNamespace(u=u) for u in held),
+        correction=SimpleNamespace(vector=np.array([mgauss_per_a, 0.0, 0.0])),
+        strength=500.0,
+        vertical=433.0,
+    )
+    assert grade(whole.on_constancy(problem, of, LIMITS, bound)) is expected
+
+
+@pytest.mark.parametrize(
     ("share", "dip_deg", "expected"),
     [
         (1.0, 60.0, GOOD),

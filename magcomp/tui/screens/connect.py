@@ -78,7 +78,7 @@ result. Nothing has been written or changed yet.
 
     def show(self, card: VehicleCard | None, steps: Sequence[str] = ()) -> None:
         """Draw a card, and below it what is done in some steps."""
-        text = Content("\n\n").join([card_text(card), *map(step_text, steps)])
+        text = Content("\n").join([card_text(card), Content(""), *map(step_text, steps)])
         self.query_one("#card-text", Static).update(text)
 
 
