@@ -76,13 +76,17 @@ class TestOnEveryTransport:
         assert (heartbeat.type, heartbeat.autopilot) == (2, 3)
 
     def test_it_gives_its_whole_parameter_list(self, ground):
-        ground.mav.param_request_list_send(1, 1)
         seen, count = set(), None
-        while len(seen) != count:
-            value = ground.recv_match(type="PARAM_VALUE", blocking=True, timeout=WITHIN_S)
-            assert value is not None
-            seen.add(value.param_index)
-            count = value.param_count
+        for _ in range(WITHIN_S):  # a datagram that a busy computer drops is asked for again
+            ground.mav.param_request_list_send(1, 1)
+            while len(seen) != count:
+                value = ground.recv_match(type="PARAM_VALUE", blocking=True, timeout=1.0)
+                if value is None:
+                    break
+                seen.add(value.param_index)
+                count = value.param_count
+            if len(seen) == count:
+                break
         assert seen == set(range(count))
 
     def test_it_echoes_a_set(self, ground):
