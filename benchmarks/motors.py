@@ -2,7 +2,8 @@
 
 Each seed is another vehicle, flown briskly. Heading errors are those at the largest current flown,
 every motor drawing its share, over all yaws, level and tilted 20°, against the truth; vectors are
-those of the motors, as a share of the truth.
+those of the motors, as a share of the truth, and within what is stated of them where they lie
+within 1.96 standard errors as the judge leaves them.
 
     python benchmarks/motors.py [--seeds 100] [--first 1] [--spread 0.0] [--program brisk]
 """
@@ -12,6 +13,7 @@ from __future__ import annotations
 import argparse
 import tempfile
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +28,7 @@ from magcomp.align import (
     to_undo,
 )
 from magcomp.fit import Problem, best_form, fit
+from magcomp.judge import judge
 from magcomp.model import CURRENT, FloatArray, MotorFit, Recording
 from magcomp.simulate import write_tlog
 from magcomp.sources import read
@@ -34,16 +37,18 @@ COMPASS = 1
 
 
 def fits_of(recording: Recording) -> tuple[MotorFit, MotorFit]:
-    """By the current, and motor by motor."""
+    """By the current, and motor by motor with the covariance that is stated of it."""
     found = controls(recording)
     new = thinned(readings(recording, COMPASS))
     in_force, earth = to_undo(recording, found), expected_earth(recording)
     by_current = [form for form in found if form.kind == CURRENT]
-    one, each = (
-        fit(best_form([Problem(new, form, in_force, earth) for form in forms]))
+    problems = (
+        best_form([Problem(new, form, in_force, earth) for form in forms])
         for forms in (by_current, currents_of_motors(recording))
     )
-    return one, each
+    one, each = ((problem, fit(problem)) for problem in problems)
+    judged, _ = judge(*each)
+    return one[1], replace(each[1], covariance=judged.covariance)
 
 
 def line(name: str, values: Sequence[float] | FloatArray) -> str:

@@ -35,7 +35,10 @@ _SHIFTS = np.arange(-0.2, 0.301, 0.02)
 _COARSE = 3
 """Every so manieth shift is tried, and then those around the best: a vehicle's current has no two
 that fit so near each other."""
-_TREND_S = 5.0
+_TRENDS_S = (5.0, 2.0, 1.0)
+"""Half-widths of the window, longest first, over which what outputs do not explain is followed."""
+
+_CLEARLY_SHORTER = 0.9
 _LEAST_ROWS = 30
 POWERS = (1, 2, 3)
 _LEAST_EXPLAINED = 0.8
@@ -281,11 +284,33 @@ def _rebuilt_through(
     time = features.time + _SHIFTS[best]
     as_reported = Series(time, coefficients[0] + seen.value @ coefficients[1:])
     left = reference.value - interpolate(as_reported, reference.time)
-    trend = running_mean(Series(reference.time, left), _TREND_S)
     modelled = coefficients[0] + features.value @ coefficients[1:]
-    slow = interpolate(trend, time)
+    slow = interpolate(_trend(Series(reference.time, left)), time)
     value = np.maximum(modelled + slow, 0.0)
     return Rebuilt(Control(kind, Series(time, value), name), cost, coefficients, slow)
+
+
+def _trend(left: Series) -> Series:
+    """What outputs do not explain of a current: its mean over a window of time.
+
+    A motor draws less in the wash of a descent, and more as the wind takes it: a matter of seconds.
+    A shorter window follows that and takes in more noise; it is taken where it tells each value
+    clearly better from those beside it.
+    """
+    windows = [(half, running_mean(left, half)) for half in _TRENDS_S]
+    tried = [(_untold(left, means, half), means) for half, means in windows]
+    usual, best = tried[0], min(tried, key=lambda each: each[0])
+    return (best if best[0] < _CLEARLY_SHORTER * usual[0] else usual)[1]
+
+
+def _untold(series: Series, means: Series, half_width: float) -> float:
+    """Mean square of what the others in the window of each value do not tell of it."""
+    first = np.searchsorted(series.time, series.time - half_width, side="left")
+    last = np.searchsorted(series.time, series.time + half_width, side="right")
+    others = last - first - 1
+    if np.any(others < 1):
+        return np.inf
+    return float(np.mean(((series.value - means.value) * (others + 1) / others) ** 2))
 
 
 def smoothed(series: Series, constant: float) -> Series:

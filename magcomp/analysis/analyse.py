@@ -9,7 +9,6 @@ import numpy as np
 
 from magcomp import autopilots
 from magcomp.align import (
-    controls,
     currents_of_motors,
     expected_earth,
     on_lift_alone,
@@ -25,6 +24,7 @@ from magcomp.analysis.choose import with_speed_controllers
 from magcomp.analysis.compare import Judged, beaten, better
 from magcomp.analysis.emit import Emission, emit, what_applies
 from magcomp.analysis.forms import compared, forms_notes
+from magcomp.analysis.missing import controls_of, no_motors, with_cure
 from magcomp.analysis.motor_by_motor import Answer, as_written
 from magcomp.analysis.multiplied import kinds_to_try, why_only_to_look_at
 from magcomp.analysis.notes import lacking_notes, notes_of
@@ -130,10 +130,10 @@ def analyse(
         wanted = replace(wanted, regressor=CURRENT)
     recording, left_out = on_lift_alone(recording)
     compasses = _compasses(recording, wanted)
-    found = _controls_of(recording)
+    found = controls_of(recording)
     motors = currents_of_motors(recording)
     if wanted.regressor == MOTORS and not motors:
-        raise _no_motors(recording)
+        raise no_motors(recording)
     kinds = _kinds(recording, found, wanted)
     earth, in_force = expected_earth(recording), to_undo(recording, found)
     steps = len(kinds) * len(compasses)
@@ -159,7 +159,7 @@ def analyse(
             forms = [result.problem.control]
             judged.setdefault(kind, []).append(result)
     if not judged:
-        raise _with_cure(recording, compasses[0], lacking[compasses[0]])
+        raise with_cure(recording, compasses[0], lacking[compasses[0]])
     progress("done", 1.0)
     chosen = MOTORS if MOTORS in judged else better(judged)
     answers = [as_written(recording, each) for each in judged[chosen]]
@@ -238,7 +238,7 @@ def check(recording: Recording, options: Options | None = None) -> Mapping[int, 
     wanted = Options() if options is None else options
     recording, _ = on_lift_alone(recording)
     compasses = _compasses(recording, wanted)
-    found = _controls_of(recording)
+    found = controls_of(recording)
     earth = expected_earth(recording)
     by_kind = to_undo(recording, found)
     verdicts: dict[int, Verdict] = {}
@@ -289,7 +289,7 @@ def regressor_in_force(recording: Recording) -> str:
         Where the recording holds no control quantity.
     """
     in_force = autopilots.of(recording).regressor(recording.parameters.latest)
-    return in_force or _controls_of(recording)[0].kind
+    return in_force or controls_of(recording)[0].kind
 
 
 def _one(
@@ -335,23 +335,6 @@ def _in_words_of(recording: Recording, verdict: Verdict) -> Verdict:
     return replace(verdict, reasons=tuple(in_words_of(kind, each) for each in verdict.reasons))
 
 
-def _controls_of(recording: Recording) -> tuple[Control, ...]:
-    found = controls(recording)
-    if not found:
-        raise MissingDataError(
-            f"{recording.source} must hold a battery current or a throttle that changes; instead "
-            f"it holds {_silent_controls(recording)}"
-        )
-    return found
-
-
-def _silent_controls(recording: Recording) -> str:
-    if recording.current is None and recording.throttle is None:
-        how = autopilots.of(recording).how_to_record("control", recording.format)
-        return f"neither: {how}"
-    return "neither: was the vehicle ever armed?"
-
-
 def _kinds(recording: Recording, found: Iterable[Control], wanted: Options) -> list[str]:
     """The control quantities to try, the reported ones first."""
     kinds = list(dict.fromkeys(control.kind for control in found))
@@ -383,28 +366,3 @@ def _compasses(recording: Recording, wanted: Options) -> list[int]:
     if not found:
         raise left_out[asked[0]]
     return found
-
-
-def _no_motors(recording: Recording) -> MissingDataError:
-    lacks = [
-        what
-        for what, series in (
-            ("the battery's current", recording.current),
-            ("the motors' outputs (SERVO_OUTPUT_RAW or RCOU)", recording.outputs),
-        )
-        if series is None
-    ]
-    holds = (
-        f"it lacks {' and '.join(lacks)}" if lacks else "the current does not follow the outputs"
-    )
-    return MissingDataError(
-        f"{recording.source} must hold the battery's current and the outputs of all motors for a "
-        f"fit motor by motor; instead {holds}"
-    )
-
-
-def _with_cure(recording: Recording, compass: int, lacking: MissingDataError) -> MissingDataError:
-    if compass not in recording.field:
-        return lacking
-    how = autopilots.of(recording).how_to_record("more readings", recording.format)
-    return MissingDataError(f"{lacking}: {how}")

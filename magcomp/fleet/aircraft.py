@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from operator import attrgetter
 
 from magcomp.fleet.findings import Attention, Finding, date
-from magcomp.fleet.flights import Flight, Selected
+from magcomp.fleet.flights import Flight, Selected, by
 from magcomp.fleet.history import CompassHistory, Slot, histories
 from magcomp.judge.thresholds import Thresholds
 
@@ -79,14 +81,15 @@ def aircraft(selected: Selected, limits: Thresholds | None = None) -> tuple[Airc
         Of the judge.
     """
     limits = Thresholds() if limits is None else limits
-    groups: dict[tuple[str, ...], tuple[list[Flight], list[Flight]]] = {}
+    groups: defaultdict[tuple[str, ...], tuple[list[Flight], list[Flight]]]
+    groups = defaultdict(lambda: ([], []))
     owner = partial(_owner, boards=_boards([*selected.flights, *selected.unusable]))
     for flight in selected.flights:
-        groups.setdefault(owner(flight), ([], []))[0].append(flight)
+        groups[owner(flight)][0].append(flight)
     for flight in selected.unusable:
         # What could not even be read belongs to nobody.
         if flight.autopilot and (flight.uid or flight.device_ids):
-            groups.setdefault(owner(flight), ([], []))[1].append(flight)
+            groups[owner(flight)][1].append(flight)
     standing = [_standing(flights) for flights, _ in groups.values()]
     told = iter(histories([slot for slots in standing for slot in slots], limits))
     found = [
@@ -101,12 +104,11 @@ def _standing(flights: Sequence[Flight]) -> list[Slot]:
 
     Another compass in the same place is compared with nothing that was there before.
     """
-    slots: dict[int, list[Flight]] = {}
-    for flight in flights:
-        slots.setdefault(flight.compass, []).append(flight)
+    slots = sorted(by(flights, "compass").items())
+    newest = [mine[-1].device_id for _, mine in slots]
     return [
-        (slot, mine[-1].device_id, [f for f in mine if f.device_id == mine[-1].device_id])
-        for slot, mine in sorted(slots.items())
+        (slot, device, [flight for flight in mine if flight.device_id == device])
+        for (slot, mine), device in zip(slots, newest, strict=True)
     ]
 
 
@@ -118,9 +120,10 @@ def _urgency(each: Aircraft) -> tuple[int, float, str]:
 def _boards(flights: Iterable[Flight]) -> dict[tuple[str, str], set[str]]:
     """Autopilot and compasses to the boards they were seen on."""
     found: dict[tuple[str, str], set[str]] = {}
-    for flight in flights:
-        if flight.uid:
-            found.setdefault((flight.autopilot, flight.device_ids), set()).add(flight.uid)
+    seen = {(flight.autopilot, flight.device_ids, flight.uid) for flight in flights}
+    for autopilot, device_ids, uid in seen:
+        if uid:
+            found.setdefault((autopilot, device_ids), set()).add(uid)
     return found
 
 
@@ -147,8 +150,9 @@ def _aircraft(
     in_order = flights[-1:] if flights and math.isfinite(flights[-1].when) else flights
     newest = max([*in_order, *unusable], key=_when)
     changed: list[Finding] = []
+    count = Counter(map(attrgetter("compass"), flights))
     for one in histories:
-        before = sum(flight.compass == one.compass for flight in flights) - len(one.flights)
+        before = count[one.compass] - len(one.flights)
         if before:
             changed.append(
                 Finding(

@@ -88,6 +88,8 @@ def select(table: Any, logs: Sequence[Log], known: Known, since: float = -math.i
     since
         Unix time before which flights are left out.
     """
+    # What the last overview was made of may go.
+    gc.unfreeze()
     wanted: dict[str, str] = {}
     lost: set[str] = set()
     for log in logs:
@@ -151,7 +153,12 @@ class _Rows:
 def _flights(
     table: Any, rows: IntArray, paths: Mapping[str, str] | None = None
 ) -> Sequence[Flight]:
-    """Some rows as flights, made without Python looking for circles among them again and again."""
+    """Some rows as flights.
+
+    Notes
+    -----
+    Made, and kept, without Python looking for circles among them again and again.
+    """
     if not len(rows):
         return []
     columns = {name: _column(table, name, rows) for name in Flight._fields}
@@ -162,6 +169,7 @@ def _flights(
     try:
         return list(map(Flight._make, zip(*columns.values(), strict=True)))
     finally:
+        gc.freeze()
         if enabled:
             gc.enable()
 

@@ -250,3 +250,19 @@ def test_a_smoothing_shorter_than_a_step_of_the_outputs_is_undone_too() -> None:
     ]
     best = max(rows, key=lambda row: np.corrcoef(row, true[inside])[0, 1])
     assert np.polyfit(best, true[inside], 1)[0] == pytest.approx(1.0, abs=0.01)
+
+
+@pytest.mark.parametrize(("period", "noise", "most"), [(5.0, 0.05, 0.2), (60.0, 1.0, 0.16)])
+def test_what_outputs_do_not_explain_is_followed_as_closely_as_it_shows(
+    period: float, noise: float, most: float
+) -> None:
+    """A load of 1 A that comes and goes within seconds; a monitor with a noise of 1 A."""
+    fast, often = np.arange(0.0, 120.0, 0.1), np.arange(0.0, 120.0, 0.1)
+    load = np.sin(2.0 * np.pi * fast / period)
+    true = 5.0 + 50.0 * thrust_at(fast) + load
+    told = true + noise * np.random.default_rng(0).normal(size=len(often))
+    recording = replace(flying(), throttle=None, current=Series(often, told))
+    (rebuilt,) = (form for form in controls(recording) if "rebuilt" in form.origin)
+    inside = (rebuilt.series.time > 5.0) & (rebuilt.series.time < 115.0)
+    error = rebuilt.series.value[inside] - np.interp(rebuilt.series.time[inside], fast, true)
+    assert np.sqrt(np.mean(error**2)) < most

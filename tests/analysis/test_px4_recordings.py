@@ -93,7 +93,7 @@ def test_every_compass_of_a_recording_is_put_right(name: str) -> None:
     path = px4_truth.RECORDINGS / name
     if not path.exists():
         pytest.skip("the shared recordings are not here")
-    assert all(error < 1.25 for error in analysed(path).values())
+    assert all(error < 1.0 for error in analysed(path).values())
 
 
 @pytest.mark.skipif(not px4_truth.RECORDINGS.exists(), reason="no shared recordings here")
