@@ -52,6 +52,7 @@ PX4's telemetry does by 0.5 up to 1.15: docs/autopilots.md, PX4: link.
 _STEPS_SEEN = 0.4
 """Of the step at which outputs are told: a shorter smoothing is lost between them."""
 _CLEARLY_SMOOTHED = 0.97
+_FEWEST = 2
 _STEPS_OF_SMOOTHING = 4
 _MOST_REGRESSED = 20_000
 _MOST_ROWS = 1_000_000
@@ -315,7 +316,7 @@ def _untold(series: Series, means: Series, half_width: float) -> float:
 
 def smoothed(series: Series, constant: float) -> Series:
     """What a first-order low pass of a time constant in seconds makes of columns, (n, k)."""
-    if constant <= 0.0:
+    if constant <= 0.0 or len(series) < _FEWEST:
         return series
     told, length = float(np.median(np.diff(series.time))), float(np.ptp(series.time))
     step = max(min(told, constant / _STEPS_OF_SMOOTHING), length / _MOST_ROWS)

@@ -38,7 +38,9 @@ def forms_notes(
     """What the comparison says that the chosen form does not have."""
     better: dict[str, list[tuple[int, Form, Form]]] = {}
     for compass, tried in by_compass.items():
-        best = next(form for form in tried if form.is_best)
+        best = next((form for form in tried if form.is_best), None)
+        if best is None:  # what none of them leaves can be told
+            continue
         now = next((form for form in tried if form.name == chosen), tried[0])
         if best.count > now.count:
             better.setdefault(best.name, []).append((compass, best, now))

@@ -9,6 +9,7 @@ import pytest
 from synthetic import Flown, problem_of
 
 from magcomp.align import controls, reported
+from magcomp.align.control import smoothed
 from magcomp.model import (
     CURRENT,
     THROTTLE,
@@ -266,3 +267,9 @@ def test_what_outputs_do_not_explain_is_followed_as_closely_as_it_shows(
     inside = (rebuilt.series.time > 5.0) & (rebuilt.series.time < 115.0)
     error = rebuilt.series.value[inside] - np.interp(rebuilt.series.time[inside], fast, true)
     assert np.sqrt(np.mean(error**2)) < most
+
+
+@pytest.mark.parametrize("count", [0, 1])
+def test_what_was_told_hardly_at_all_is_not_smoothed(count):
+    series = Series(np.arange(count, dtype=float), np.full((count, 4), 3.0))
+    assert smoothed(series, 0.1) is series

@@ -74,7 +74,12 @@ def test_no_scheduler_is_a_link_that_fails(monkeypatch: pytest.MonkeyPatch) -> N
 
 @pytest.mark.slow
 def test_a_piece_that_kills_every_worker_is_lost_alone() -> None:
+    import dask  # noqa: PLC0415 - no other test needs it
+
+    # A local cluster gives up a worker that is away after fifteen seconds, in which a busy
+    # computer may not have started it again; then nobody is left to do the work.
     with (
+        dask.config.set({"distributed.deploy.lost-worker-timeout": "1h"}),
         cluster(n_workers=1, threads_per_worker=1, dashboard_address=":0") as local,
         connected(local.scheduler_address) as client,
     ):
