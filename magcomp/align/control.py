@@ -39,6 +39,7 @@ _TRENDS_S = (5.0, 2.0, 1.0)
 """Half-widths of the window, longest first, over which what outputs do not explain is followed."""
 
 _CLEARLY_SHORTER = 0.9
+_TIMES_SMOOTHED = 5.0
 _LEAST_ROWS = 30
 POWERS = (1, 2, 3)
 _LEAST_EXPLAINED = 0.8
@@ -286,19 +287,21 @@ def _rebuilt_through(
     as_reported = Series(time, coefficients[0] + seen.value @ coefficients[1:])
     left = reference.value - interpolate(as_reported, reference.time)
     modelled = coefficients[0] + features.value @ coefficients[1:]
-    slow = interpolate(_trend(Series(reference.time, left)), time)
+    slow = interpolate(_trend(Series(reference.time, left), smoothing), time)
     value = np.maximum(modelled + slow, 0.0)
     return Rebuilt(Control(kind, Series(time, value), name), cost, coefficients, slow)
 
 
-def _trend(left: Series) -> Series:
+def _trend(left: Series, smoothing: float) -> Series:
     """What outputs do not explain of a current: its mean over a window of time.
 
     A motor draws less in the wash of a descent, and more as the wind takes it: a matter of seconds.
     A shorter window follows that and takes in more noise; it is taken where it tells each value
-    clearly better from those beside it.
+    clearly better from those beside it. What a monitor smooths in another way than it is taken to
+    lasts some of its time constants, and is no load.
     """
-    windows = [(half, running_mean(left, half)) for half in _TRENDS_S]
+    least = min(_TIMES_SMOOTHED * smoothing, _TRENDS_S[0])
+    windows = [(half, running_mean(left, half)) for half in _TRENDS_S if half >= least]
     tried = [(_untold(left, means, half), means) for half, means in windows]
     usual, best = tried[0], min(tried, key=lambda each: each[0])
     return (best if best[0] < _CLEARLY_SHORTER * usual[0] else usual)[1]
