@@ -56,7 +56,7 @@ _CLEARLY_SMOOTHED = 0.97
 _FEWEST = 2
 _STEPS_OF_SMOOTHING = 4
 _MOST_REGRESSED = 20_000
-_MOST_ROWS = 1_000_000
+_MOST_ROWS, _MOST_ROWS_A_VALUE = 1_000_000, 50
 """More rows in even steps than this mean that the times are not to be trusted."""
 
 
@@ -322,14 +322,18 @@ def smoothed(series: Series, constant: float) -> Series:
     if constant <= 0.0 or len(series) < _FEWEST:
         return series
     told, length = float(np.median(np.diff(series.time))), float(np.ptp(series.time))
-    step = max(min(told, constant / _STEPS_OF_SMOOTHING), length / _MOST_ROWS)
+    most = min(_MOST_ROWS, _MOST_ROWS_A_VALUE * len(series))
+    step = max(min(told, constant / _STEPS_OF_SMOOTHING), length / most)
     if step > told:
         return series
     time = np.arange(series.time[0], series.time[-1] + step, step)
-    even = interpolate(series, time)
     share = 1.0 - float(np.exp(-step / constant))
-    smooth = low_pass(even, share, even[0])
-    return Series(series.time, interpolate(Series(time, smooth), series.time))
+    value = np.empty(series.value.shape)
+    # One column after the other: of half a day, all of them at once are 100 MB.
+    for to, column in zip(value.T, series.value.T, strict=True):
+        even = np.interp(time, series.time, column)[:, None]
+        to[:] = np.interp(series.time, time, low_pass(even, share, even[0]).ravel())
+    return Series(series.time, value)
 
 
 def _regress(reference: Series, features: Series, shift: float) -> tuple[FloatArray, float]:

@@ -273,3 +273,9 @@ def test_what_outputs_do_not_explain_is_followed_as_closely_as_it_shows(
 def test_what_was_told_hardly_at_all_is_not_smoothed(count):
     series = Series(np.arange(count, dtype=float), np.full((count, 4), 3.0))
     assert smoothed(series, 0.1) is series
+
+
+def test_one_time_far_away_does_not_make_a_million_steps_of_a_hundred_values() -> None:
+    time = np.append(np.arange(0.0, 10.0, 0.1), 90_000.0)
+    series = Series(time, np.ones((len(time), 1)))
+    assert smoothed(series, 0.5) is series
