@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import io
-import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from rich.console import Console, Group, RenderableType
@@ -20,30 +18,21 @@ from magcomp.model import (
     Analysis,
     CompassResult,
     Grade,
-    HeadingError,
     Recording,
     Vehicle,
     Verdict,
 )
-from magcomp.report import as_json, plain, tables, words
+from magcomp.report import as_json, plain, tables, verdicts_text, words
 from magcomp.report.ascii import in_words
-from magcomp.report.bars import BEFORE_AFTER, Row, bars
+from magcomp.report.bars import Row, bars
 from magcomp.report.bend import steps_of
 from magcomp.report.look import Look
 from magcomp.report.roles import roles
-
-GRADE_STYLE = {Grade.GOOD: "bold green", Grade.MARGINAL: "bold yellow", Grade.REJECTED: "bold red"}
-_GRADE_SIGN = {Grade.GOOD: "●", Grade.MARGINAL: "◐", Grade.REJECTED: "○"}
-
-_ALIKE_DEG, _ALIKE_SHARE = 0.5, 0.05
-"""Compasses whose heading errors differ by less share one picture."""
 
 _AFTER_WRITING = (
     "Load it with your ground station (MAVProxy: param load), fly once more, and run magcomp "
     "check on the new log."
 )
-
-_DIGITS = re.compile(r"\d+(\.\d+)?")
 
 
 def analysis_text(
@@ -83,7 +72,7 @@ def analysis_text(
         [
             *_first_lines(plain.pilots_lines(document)),
             *_whose(analysis.source, analysis.vehicle, analysis.duration_s),
-            *findings(analysis, document, verbose=verbose),
+            *verdicts_text.of_analysis(analysis, document, verbose=verbose),
             *_roles(document),
             *evidence(analysis, verbose=verbose),
             *_parameters(parameters, present, verbose=verbose),
@@ -118,8 +107,12 @@ def check_text(
         *_first_lines([plain.check_line(verdicts, kind)]),
         *_whose(recording.source, recording.vehicle, recording.duration_s),
     ]
-    results = [_Finding(compass, verdict, kind) for compass, verdict in sorted(verdicts.items())]
-    parts.extend(_findings(results, ("in force", "at most (95 %)"), ("red", "yellow")))
+    results = [
+        verdicts_text.Finding(compass, verdict, kind)
+        for compass, verdict in sorted(verdicts.items())
+    ]
+    columns = ("in force", "at most (95 %)")
+    parts.extend(verdicts_text.of_findings(results, columns, ("red", "yellow")))
     parts.append(Text())
     parts.append(tables.check(verdicts, kind))
     if left_out := on_lift_alone(recording)[1]:
@@ -225,79 +218,6 @@ def _whose(source: str, vehicle: Vehicle, duration_s: float) -> Iterator[Rendera
         yield Padding(Text(f"compass device ids {ids}", style="dim"), (0, 0, 0, 1))
 
 
-@dataclass(frozen=True)
-class _Finding:
-    compass: int
-    verdict: Verdict
-    regressor: str
-    quoted: HeadingError | None = None
-    verbose: bool = True
-
-    @property
-    def reasons(self) -> Sequence[str]:
-        """What is said of it: without the judge's summary where the pilot's line says that."""
-        every = self.verdict.reasons
-        return every if self.verbose else plain.doubts(every, self.verdict.grade)
-
-
-def findings(
-    analysis: Analysis, document: Mapping[str, Any] | None = None, *, verbose: bool = True
-) -> Iterator[RenderableType]:
-    """Verdict, reasons and picture of each compass; of compasses that are alike, once."""
-    document = as_json.analysis_object(analysis) if document is None else document
-    results = [
-        _Finding(c.fit.compass, c.verdict, c.fit.regressor, _row_of(found["quoted"]), verbose)
-        for c, found in zip(analysis.compasses, document["compasses"], strict=True)
-    ]
-    return _findings(results, ("now", "corrected, at most (95 %)"), BEFORE_AFTER)
-
-
-def _row_of(quoted: Mapping[str, float]) -> HeadingError:
-    return HeadingError(*(quoted[name] for name in ("u", "before", "after", "p95")))
-
-
-def _findings(
-    results: Sequence[_Finding], columns: tuple[str, str], styles: tuple[str, str]
-) -> Iterator[RenderableType]:
-    for group in _alike(results):
-        first = group[0]
-        yield Text()
-        title = _title(first.verdict.grade, [result.compass for result in group])
-        yield Padding(title, (0, 0, 0, 1))
-        for reason in first.reasons:
-            yield Padding(Text(words.sentence(reason)), (0, 1, 0, 3))
-        if rows := list(_rows(first)):
-            yield Text()
-            yield bars("heading error", columns, rows, styles)
-        covered, table = first.verdict.coverage, first.verdict.heading_error
-        low, high = (words.quantity(u, first.regressor) for u in (covered.u_low, covered.u_high))
-        if not all(words.is_flown(row.u, covered.u_low, covered.u_high) for row in table):
-            note = f"in brackets: reckoned, not flown; the log covers {low} to {high}"
-            yield Padding(Text(note, style="dim"), (0, 0, 0, 6))
-
-
-def _rows(finding: _Finding) -> Iterator[Row]:
-    """The table, with the row that the sentences quote in its place."""
-    quoted, covered = finding.quoted, finding.verdict.coverage
-    table = list(finding.verdict.heading_error)
-    if quoted is not None:
-        near = {words.quantity(quoted.u, finding.regressor)}
-        table = [row for row in table if words.quantity(row.u, finding.regressor) not in near]
-        table = sorted([*table, quoted], key=lambda row: row.u)
-    for row in table:
-        u = words.quantity(row.u, finding.regressor)
-        flown = words.is_flown(row.u, covered.u_low, covered.u_high)
-        # What is in force is known no better than the fit is: below the fit's bound, its own
-        # error is that bound, and the correction must not look worse.
-        bounded = quoted is not None and row.before <= row.p95
-        yield Row(
-            u if flown else f"({u})",
-            (max(row.before, row.p95) if bounded else row.before, row.p95),
-            is_bound=bounded,
-            is_marked=row is quoted,
-        )
-
-
 def _roles(document: Mapping[str, Any]) -> Iterator[RenderableType]:
     """Which compass the autopilot uses, and what to do with each."""
     found = roles(document)
@@ -309,45 +229,6 @@ def _roles(document: Mapping[str, Any]) -> Iterator[RenderableType]:
         use = f" ({role.use})" if role.use else ""
         line.append(f"{use}: {role.action}", style="not bold")
         yield Padding(line, (0, 0, 0, 1))
-
-
-def _title(grade: Grade, numbers: Sequence[int]) -> Text:
-    title = Text()
-    title.append(f"{_GRADE_SIGN[grade]} {grade.value.upper()}", style=GRADE_STYLE[grade])
-    title.append(f"  {words.compasses(numbers)}", style="bold")
-    if len(numbers) > 1:
-        title.append(f" (alike; the numbers are those of compass {numbers[0]})", style="dim")
-    return title
-
-
-def _alike(results: Sequence[_Finding]) -> list[list[_Finding]]:
-    """Compasses of the same verdict whose tables of heading error agree, together."""
-    groups: list[list[_Finding]] = []
-    for result in results:
-        group = next((group for group in groups if _same(group[0], result)), None)
-        if group is None:
-            groups.append([result])
-        else:
-            group.append(result)
-    return groups
-
-
-def _same(one: _Finding, other: _Finding) -> bool:
-    def wording(finding: _Finding) -> list[str]:
-        return [_DIGITS.sub("#", reason) for reason in finding.verdict.reasons]
-
-    def near(a: float, b: float) -> bool:
-        return abs(a - b) <= max(_ALIKE_DEG, _ALIKE_SHARE * max(a, b))
-
-    tables_of = (one.verdict.heading_error, other.verdict.heading_error)
-    return (
-        one.verdict.grade is other.verdict.grade
-        and wording(one) == wording(other)
-        and len(tables_of[0]) == len(tables_of[1])
-        and all(
-            near(a.before, b.before) and near(a.p95, b.p95) for a, b in zip(*tables_of, strict=True)
-        )
-    )
 
 
 def evidence(analysis: Analysis, *, verbose: bool = True) -> Iterator[RenderableType]:
