@@ -12,9 +12,11 @@ from magcomp.fit import Problem, best_form, fit_alike, solvable
 from magcomp.judge import field_residual
 from magcomp.model import CURRENT, MOTORS, THROTTLE, Control, Grade, MotorFit, Verdict
 
-BETTER = 0.97
-"""Throttle is written instead of current only where it leaves less than this share unexplained:
-current needs no battery at the same voltage."""
+BETTER, CLEARLY_BETTER = 0.97, 0.8
+"""Throttle is written instead of current only where it leaves less than the first share of what
+current leaves unexplained: current needs no battery at the same voltage. Down to the second share
+it must bound the heading as well: what is told late or seldom leaves more, and may still be what
+the field follows in a line."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +97,17 @@ def better(judged: Mapping[str, Sequence[Judged]]) -> str:
         kind: [j.held_out / np.sqrt(2 + (j.fit.method == "sweep")) for j in results]
         for kind, results in judged.items()
     }
-    return THROTTLE if _typical(left[THROTTLE]) < BETTER * _typical(left[CURRENT]) else CURRENT
+    share = _typical(left[THROTTLE]) / _typical(left[CURRENT])
+    if not CLEARLY_BETTER <= share < BETTER:
+        return CURRENT if share >= BETTER else THROTTLE
+    bound = {kind: _typical([_bound(j) for j in results]) for kind, results in judged.items()}
+    return THROTTLE if bound[THROTTLE] <= bound[CURRENT] else CURRENT
+
+
+def _bound(each: Judged) -> float:
+    """The largest bound of the heading that was flown, degrees."""
+    table = each.verdict.heading_error
+    return max((row.p95 for row in table if row.u <= each.fit.u_high), default=np.inf)
 
 
 def _typical(left: Sequence[float]) -> float:
@@ -116,5 +128,10 @@ def comparison(held_out: Mapping[str, Sequence[float]], chosen: str) -> str:
         f"{kind} leaves {'/'.join(f'{left:.1f}' for left in each)} mGauss"
         for kind, each in held_out.items()
     )
-    why = "was asked for" if chosen == MOTORS else "is the better choice on held-out data"
+    if chosen == MOTORS:
+        why = "was asked for"
+    elif _typical(held_out[chosen]) > min(map(_typical, held_out.values())) / BETTER:
+        why = "bounds the heading better, though on held-out data it leaves a little more"
+    else:
+        why = "is the better choice on held-out data"
     return f"{chosen} is used because it {why}: {scores}"

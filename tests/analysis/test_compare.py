@@ -65,6 +65,39 @@ def test_only_flights_can_be_compared_in_short():
     assert beaten([by_levels], forms(recording)) == ()
 
 
+def said(left: float, bound: float, by_current_best: tuple[Recording, Judged]) -> Judged:
+    """The same verdict with another residual on unseen readings and another bound throughout."""
+    known = by_current_best[1]
+    verdict = replace(
+        known.verdict,
+        grade=Grade.MARGINAL,
+        residual=replace(known.verdict.residual, held_out=left),
+        heading_error=tuple(replace(row, p95=bound) for row in known.verdict.heading_error),
+    )
+    return replace(known, verdict=verdict)
+
+
+@pytest.mark.parametrize(
+    ("left", "bound", "chosen"),
+    [
+        (0.98, 1.0, CURRENT),
+        (0.96, 1.0, THROTTLE),
+        (0.96, 3.0, CURRENT),
+        (0.82, 3.0, CURRENT),
+        (0.78, 3.0, THROTTLE),
+    ],
+)
+def test_a_throttle_that_is_little_better_must_bound_the_heading_as_well(
+    left, bound, chosen, by_current_best
+):
+    """Against a current that leaves 1 mGauss with a bound of 2 degrees."""
+    current = said(1.0, 2.0, by_current_best)
+    throttle = said(left, bound, by_current_best)
+    assert better({CURRENT: [current], THROTTLE: [throttle]}) == chosen
+    told = comparison({CURRENT: (1.0,), THROTTLE: (left,)}, chosen)
+    assert ("bounds the heading better" in told) is (chosen == CURRENT and left < 0.97)
+
+
 def test_one_kind_alone_is_the_better(by_current_best):
     assert better({THROTTLE: [by_current_best[1]]}) == THROTTLE
 
