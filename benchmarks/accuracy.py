@@ -29,6 +29,10 @@ AMPERES_AT_FULL_THROTTLE = 120.0
 
 
 def heading_error(log: Path, result: CompassResult, recording: Recording) -> str:
+    bound = max(row.p95 for row in result.verdict.heading_error if row.u <= AMPERES[-1])
+    if result.fit.regressor != CURRENT:
+        # The truth is told by the ampere, and what is written multiplies another quantity.
+        return f"not told (bound {bound:.2f}°)"
     truth = KnownTruth(log.with_suffix(".json"))
     values = {**recording.parameters.latest, **result.parameters}
     written = ardupilot.ArduPilot().in_force(values, result.fit.compass).correction
@@ -36,7 +40,6 @@ def heading_error(log: Path, result: CompassResult, recording: Recording) -> str
         truth.heading_error_deg(written, result.fit.compass, float(a), recording.start_unix_s)
         for a in AMPERES
     ]
-    bound = max(row.p95 for row in result.verdict.heading_error if row.u <= AMPERES[-1])
     return f"{max(errors):.2f}° (bound {bound:.2f}°)"
 
 
