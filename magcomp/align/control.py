@@ -252,7 +252,7 @@ def rebuild(
         return None
     powers = np.array([np.mean(duty.value**k, axis=1) for k in POWERS]).T
     features = Series(duty.time, powers)
-    plain = _rebuilt_through(reference, features, 0.0, kind, name)
+    plain = _regressed(reference, features, 0.0)
     if plain is None:
         return None
     step = float(np.median(np.diff(duty.time)))
@@ -261,16 +261,35 @@ def rebuild(
         for each in _SMOOTHINGS
         if not measured
         and each > _STEPS_SEEN * step > 0.0
-        and (found := _rebuilt_through(reference, features, each, kind, name)) is not None
+        and (found := _regressed(reference, features, each)) is not None
     ]
     best = min(smoothed, key=lambda found: found.cost, default=plain)
-    return best if best.cost < _CLEARLY_SMOOTHED * plain.cost else plain
+    if not best.cost < _CLEARLY_SMOOTHED * plain.cost:
+        best = plain
+    return _followed(reference, features, best, kind, name)
 
 
-def _rebuilt_through(
-    reference: Series, features: Series, smoothing: float, kind: str, name: str
-) -> Rebuilt | None:
-    """The quantity of which the reference is the smoothed one."""
+class _Regressed(NamedTuple):
+    """What of a smoothed quantity is explained, and how.
+
+    Attributes
+    ----------
+    smoothing
+        Its time constant, seconds.
+    coefficients, cost
+        See :class:`Rebuilt`.
+    as_reported
+        What is explained of it, at the times it was told.
+    """
+
+    smoothing: float
+    coefficients: FloatArray
+    cost: float
+    as_reported: Series
+
+
+def _regressed(reference: Series, features: Series, smoothing: float) -> _Regressed | None:
+    """The reference as the smoothed features explain it; None where they do not."""
     seen = smoothed(features, smoothing)
     # Enough to find four coefficients by: of hours of current every few readings.
     few = slice(None, None, -(-len(reference) // _MOST_REGRESSED))
@@ -283,13 +302,22 @@ def _rebuilt_through(
     coefficients, cost = fits[best]
     if not cost < (1 - _LEAST_EXPLAINED) * float(np.var(reference.value)):
         return None
-    time = features.time + _SHIFTS[best]
-    as_reported = Series(time, coefficients[0] + seen.value @ coefficients[1:])
-    left = reference.value - interpolate(as_reported, reference.time)
-    modelled = coefficients[0] + features.value @ coefficients[1:]
-    slow = interpolate(_trend(Series(reference.time, left), smoothing), time)
+    as_reported = coefficients[0] + seen.value @ coefficients[1:]
+    explained = Series(features.time + _SHIFTS[best], as_reported)
+    return _Regressed(smoothing, coefficients, cost, explained)
+
+
+def _followed(
+    reference: Series, features: Series, found: _Regressed, kind: str, name: str
+) -> Rebuilt:
+    """The quantity as it was before it was smoothed, and what its features do not explain."""
+    time = found.as_reported.time
+    left = reference.value - interpolate(found.as_reported, reference.time)
+    modelled = found.coefficients[0] + features.value @ found.coefficients[1:]
+    slow = interpolate(_trend(Series(reference.time, left), found.smoothing), time)
     value = np.maximum(modelled + slow, 0.0)
-    return Rebuilt(Control(kind, Series(time, value), name), cost, coefficients, slow)
+    control = Control(kind, Series(time, value), name)
+    return Rebuilt(control, found.cost, found.coefficients, slow)
 
 
 def _trend(left: Series, smoothing: float) -> Series:
