@@ -5,6 +5,8 @@ Body axes are x forward, y right, z down; earth axes are north, east, down.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -218,6 +220,17 @@ def heading_shift(
     still = np.einsum("...ij,...j->...i", level, np.asarray(field, float))
     horizontal = still[..., 0] ** 2 + still[..., 1] ** 2
     return np.asarray((still[..., 1] * shift[..., 0] - still[..., 0] * shift[..., 1]) / horizontal)
+
+
+def horizontal_part(strength: float, vertical: float) -> float:
+    """The horizontal part of a field, in its unit, and at least 1: headings are divided by it.
+
+    Examples
+    --------
+    >>> horizontal_part(500.0, 400.0)
+    300.0
+    """
+    return math.sqrt(max(strength**2 - vertical**2, 1.0))
 
 
 def apart(path: ArrayLike, other: ArrayLike) -> float:

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from magcomp import autopilots
-from magcomp.analysis.compare import Judged
+from magcomp.analysis.compare import Judged, flown
 from magcomp.analysis.motor_by_motor import Answer, as_written
 from magcomp.errors import MagcompError
 from magcomp.judge.finding import severity
-from magcomp.model import MOTORS, Form, HeadingError, Recording
+from magcomp.model import MOTORS, Form, Recording
 
 
 def motors_where_better(
@@ -80,11 +80,7 @@ def is_better(by_motor: Judged, by_one: Judged, costs: float) -> bool:
         Heading error that one quantity for all motors leaves, degrees.
     """
     top = min(by_motor.fit.u_high, by_one.fit.u_high)
-    new, old = (_flown(each.verdict.heading_error, top) for each in (by_motor, by_one))
+    new, old = (flown(each.verdict.heading_error, top) for each in (by_motor, by_one))
     pairs = zip(new, (float(np.hypot(each, costs)) for each in old), strict=True)
     worse = severity(by_motor.verdict.grade) > severity(by_one.verdict.grade)
     return bool(new) and not worse and all(after <= before for after, before in pairs)
-
-
-def _flown(table: Iterable[HeadingError], top: float) -> list[float]:
-    return [row.p95 for row in table if row.u <= top]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from magcomp.errors import MagcompError
 from magcomp.fit import Problem, best_form, fit_alike, solvable
 from magcomp.judge import field_residual
-from magcomp.model import CURRENT, MOTORS, THROTTLE, Control, Grade, MotorFit, Verdict
+from magcomp.model import CURRENT, MOTORS, THROTTLE, Control, Grade, HeadingError, MotorFit, Verdict
 
 BETTER, CLEARLY_BETTER = 0.97, 0.8
 """Throttle is written instead of current only where it leaves less than the first share of what
@@ -106,8 +106,12 @@ def better(judged: Mapping[str, Sequence[Judged]]) -> str:
 
 def _bound(each: Judged) -> float:
     """The largest bound of the heading that was flown, degrees."""
-    table = each.verdict.heading_error
-    return max((row.p95 for row in table if row.u <= each.fit.u_high), default=np.inf)
+    return max(flown(each.verdict.heading_error, each.fit.u_high), default=np.inf)
+
+
+def flown(table: Iterable[HeadingError], top: float) -> list[float]:
+    """The bounds of the rows up to the largest control quantity flown, degrees."""
+    return [row.p95 for row in table if row.u <= top]
 
 
 def _typical(left: Sequence[float]) -> float:

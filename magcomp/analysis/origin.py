@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from magcomp.geometry import horizontal_part
 from magcomp.model import FloatArray, MotorFit, quantity_of
 
 WIRE_MGAUSS_M = 2.0
@@ -121,7 +122,7 @@ def hints(fits: Sequence[MotorFit]) -> Iterator[str]:
     if not of_currents:
         return
     fit = max(of_currents, key=lambda each: float(np.linalg.norm(each.interference)))
-    horizontal = float(np.sqrt(max(fit.strength**2 - fit.vertical**2, 1.0)))
+    horizontal = horizontal_part(fit.strength, fit.vertical)
     worst = float(np.linalg.norm(fit.interference)) * fit.u_high / horizontal
     found = origin_of(fit.interference)
     if found is None or worst < _WORTH_LOOKING_RAD:

@@ -31,6 +31,7 @@ from magcomp.fleet.pooled import (
     pool,
     pools,
 )
+from magcomp.geometry import horizontal_part
 from magcomp.judge.thresholds import Thresholds
 from magcomp.model import Grade
 from magcomp.model.recording import FloatArray, IntArray
@@ -326,7 +327,7 @@ def _agree(among: IntArray, away: _Away) -> tuple[IntArray, list[tuple[int, floa
 
 def _shift(flight: Flight, at: float) -> Callable[[FloatArray], FloatArray]:
     """Heading shift in degrees, level or tilted by 20°, of a difference of motor vectors."""
-    horizontal = math.sqrt(max(flight.strength**2 - flight.vertical**2, 1.0))
+    horizontal = horizontal_part(flight.strength, flight.vertical)
 
     def degrees(difference: FloatArray) -> FloatArray:
         level = np.hypot(difference[..., 0], difference[..., 1])

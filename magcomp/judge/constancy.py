@@ -23,6 +23,7 @@ from magcomp.fit.field_model import (
 )
 from magcomp.fit.flight import drift_blocks, prior
 from magcomp.fit.robust import spread_of, time_blocks
+from magcomp.geometry import horizontal_part
 from magcomp.model import (
     OFFSET,
     FloatArray,
@@ -156,7 +157,7 @@ def departures_of(problem: Problem, fit: MotorFit, lags: Lags) -> tuple[Departur
     samples = problem.sample(lags)
     values, slopes = strength_and_dip(samples, parameters_of(fit, lags))
     linear = _weighted(problem, values, slopes)
-    horizontal = float(np.sqrt(max(fit.strength**2 - fit.vertical**2, 1.0)))
+    horizontal = horizontal_part(fit.strength, fit.vertical)
     top = float(np.quantile(samples.total, 0.98))
     if top <= 0.0:
         return ()

@@ -7,7 +7,13 @@ from collections.abc import Mapping
 import numpy as np
 
 from magcomp.fit.nearest import moved, nearest
-from magcomp.geometry import body_from_earth, heading_shift, level_matrix, wrap_angle
+from magcomp.geometry import (
+    body_from_earth,
+    heading_shift,
+    horizontal_part,
+    level_matrix,
+    wrap_angle,
+)
 from magcomp.model import (
     CORRECTION_SIZE,
     MOTOR,
@@ -223,7 +229,7 @@ def level_errors(fit: MotorFit, present: Correction, u: float, present_u: float)
 
 def _field_at(fit: MotorFit, roll: FloatArray, pitch: FloatArray, yaw: FloatArray) -> FloatArray:
     """The earth's field as found, in body axes at each attitude, mGauss, shape (k, 3)."""
-    horizontal = np.sqrt(max(fit.strength**2 - fit.vertical**2, 1.0))
+    horizontal = horizontal_part(fit.strength, fit.vertical)
     earth = np.array([horizontal, 0.0, fit.vertical])
     return np.asarray(body_from_earth(roll, pitch, yaw) @ earth)
 

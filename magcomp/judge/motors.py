@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from magcomp.fit.motors import contrasts
+from magcomp.geometry import horizontal_part
 from magcomp.judge.finding import Finding
 from magcomp.judge.thresholds import Thresholds
 from magcomp.model import Coverage, FloatArray, Grade, MotorFit
@@ -29,7 +30,7 @@ def on_motors(fit: MotorFit, covered: Coverage, limits: Thresholds) -> Iterator[
         return
     parts = fit.correction.motor.shape[1]
     std, pattern = _worst(fit.told_apart, parts)
-    horizontal = float(np.sqrt(max(fit.strength**2 - fit.vertical**2, 1.0)))
+    horizontal = horizontal_part(fit.strength, fit.vertical)
     usual = (covered.u_median if np.isfinite(covered.u_median) else covered.u_high) / parts
     degrees = float(np.degrees(np.sqrt(2.0) * std * usual / horizontal))
     if degrees <= limits.good_deg:

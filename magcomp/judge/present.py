@@ -14,12 +14,12 @@ from magcomp.fit import (
     require_readings,
     spread,
 )
-from magcomp.geometry import body_from_earth
+from magcomp.geometry import body_from_earth, horizontal_part
 from magcomp.judge.evidence import cover
 from magcomp.judge.finding import Finding, severity
 from magcomp.judge.gates import on_control, on_duration, on_turn, on_unseen_parameters
 from magcomp.judge.heading_error import attitudes, largest_shift, present_by
-from magcomp.judge.thresholds import Thresholds
+from magcomp.judge.thresholds import TWO_SIDED_95, Thresholds
 from magcomp.model import (
     Correction,
     FieldResidual,
@@ -34,7 +34,6 @@ from magcomp.model import (
 
 _MAD_TO_STD = 1.4826
 _BINS = 6
-_TWO_SIDED_95 = 1.96
 
 
 def judge_present(
@@ -146,7 +145,7 @@ def _error(level: Level, present: Correction, earth: tuple[float, float]) -> Hea
     """Heading error that a level's departure from the present correction makes."""
     delta = present.soft_iron @ (level.centre - present.centre(level.u))
     covariance = present.soft_iron @ level.covariance @ present.soft_iron.T
-    doubt = _TWO_SIDED_95 * float(np.sqrt(np.linalg.eigvalsh(covariance)[-1]))
+    doubt = TWO_SIDED_95 * float(np.sqrt(np.linalg.eigvalsh(covariance)[-1]))
     size = float(np.linalg.norm(delta))
     direction: FloatArray = delta / size if size > 0 else np.array([1.0, 0.0, 0.0])
     found = _shift(delta, earth)
@@ -158,7 +157,7 @@ def _error(level: Level, present: Correction, earth: tuple[float, float]) -> Hea
 def _shift(delta: FloatArray, earth: tuple[float, float]) -> float:
     strength, vertical = earth
     roll, pitch, yaw = attitudes()
-    horizontal = np.sqrt(max(strength**2 - vertical**2, 1.0))
+    horizontal = horizontal_part(strength, vertical)
     field = body_from_earth(roll, pitch, yaw) @ np.array([horizontal, 0.0, vertical])
     return largest_shift(field + delta, field, roll, pitch)
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+TWO_SIDED_95 = 1.96
+
 
 @dataclass(frozen=True)
 class Thresholds:

@@ -8,10 +8,11 @@ import numpy as np
 
 from magcomp.fit import Problem
 from magcomp.fit.flight import DIP_WIDTH
+from magcomp.geometry import horizontal_part
 from magcomp.judge.constancy import Departure, departures_of
 from magcomp.judge.evidence import used_lags
 from magcomp.judge.finding import Finding
-from magcomp.judge.thresholds import Thresholds
+from magcomp.judge.thresholds import TWO_SIDED_95, Thresholds
 from magcomp.model import Grade, MotorFit, Samples, quantity_of
 
 _WEAKEST_SHARE, _STRONGEST_SHARE = 0.35, 2.5
@@ -20,7 +21,6 @@ _WEAKEST_SHARE, _STRONGEST_SHARE = 0.35, 2.5
 _DIP_WIDTHS = 4.0
 
 _TOO_FEW_FOR_A_LINE = 2
-_TWO_SIDED = 1.96
 
 _DRIFTS = 1.5
 """A step of so many times the limit is no drift whatever the bound."""
@@ -82,11 +82,11 @@ def _on_two_levels(
     """
     low, high = sorted(level.u for level in fit.levels)
     length = float(np.linalg.norm(fit.correction.vector)) * (high - low)
-    horizontal = float(np.sqrt(max(fit.strength**2 - fit.vertical**2, 1.0)))
+    horizontal = horizontal_part(fit.strength, fit.vertical)
     bow = float(np.degrees(length / 4.0 / horizontal))
     for each in departures:
         if each.kind == "curve":
-            bow = min(bow, each.degrees + _TWO_SIDED * each.degrees_std)
+            bow = min(bow, each.degrees + TWO_SIDED_95 * each.degrees_std)
     if np.hypot(bound, bow) > limits.good_deg:
         in_words = quantity_of(fit.regressor).in_sentence
         yield Finding(

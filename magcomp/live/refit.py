@@ -17,6 +17,7 @@ import numpy as np
 
 from magcomp.analysis.analyse import Options, analyse
 from magcomp.errors import MagcompError, unforeseen
+from magcomp.geometry import horizontal_part
 from magcomp.live.refresh import refresh
 from magcomp.model import Analysis, MotorFit, Recording
 
@@ -194,6 +195,6 @@ def change_deg(before: Analysis, after: Analysis) -> float:
 def _change_deg(old: MotorFit, new: MotorFit) -> float:
     if old.regressor != new.regressor:
         return math.inf
-    horizontal = math.sqrt(max(new.strength**2 - new.vertical**2, 1.0))
+    horizontal = horizontal_part(new.strength, new.vertical)
     moved = float(np.linalg.norm(new.interference - old.interference)) * new.u_high
     return math.degrees(moved / horizontal)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from magcomp.analysis import Options
-from magcomp.geometry import body_from_earth
+from magcomp.geometry import body_from_earth, horizontal_part
 from magcomp.judge.heading_error import attitudes, largest_shift
 from magcomp.model import Analysis, CompassResult, Grade, MotorFit, Recording
 from magcomp.report import words
@@ -105,7 +105,7 @@ def difference_deg(one: MotorFit, other: MotorFit) -> float:
     seen. Fits by different control quantities are compared at the loads of each.
     """
     roll, pitch, yaw = attitudes()
-    horizontal = math.sqrt(max(one.strength**2 - one.vertical**2, 1.0))
+    horizontal = horizontal_part(one.strength, one.vertical)
     field = body_from_earth(roll, pitch, yaw) @ np.array([horizontal, 0.0, one.vertical])
     alike = one.regressor == other.regressor
     loads = ((one.u_low, other.u_low), (one.u_high, other.u_high))
