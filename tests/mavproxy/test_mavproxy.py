@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib
+import shlex
 import sys
 import threading
 import types
@@ -17,9 +18,13 @@ from pymavlink import mavutil
 
 import magcomp
 from magcomp.link.clock import SystemClock
+from magcomp.live.guide import STEADY, Guidance
 from magcomp.mavproxy.carried import CarriedTransport
-from magcomp.model import ParameterSet
+from magcomp.mavproxy.commands import Commands
+from magcomp.model import ParameterSet, Vehicle
+from magcomp.writing.events import Outcome, Reason, Standing
 from magcomp.writing.files import read_parameter_file, write_parameter_file
+from magcomp.writing.plan import WritePlan
 
 SPEED = 3.0
 """Beyond that pymavlink, which reads for MAVProxy, does not keep up on a busy machine."""
@@ -155,6 +160,76 @@ def test_a_flight_is_fitted_written_and_undone(
         assert "Written and read back" in prompt("magcomp undo yes")
         assert held(flown.vehicle) == before
         assert list(tmp_path.glob("recording-*.tlog"))
+
+
+class FakeSession:
+    """A session that shows what it is told to, and whose write is cut off."""
+
+    def __init__(self, **shown: Any) -> None:
+        usual = {
+            "vehicle": None,
+            "link_text": "connected",
+            "ready": True,
+            "recorded_s": 90.0,
+            "recording_path": Path("flown.tlog"),
+            "warnings": (),
+            "armed": None,
+            "armed_until_s": 0.0,
+            "guidance": Guidance("turn to the right", 0.5, missing=("headings", STEADY)),
+        }
+        self.shown = {**usual, **shown}
+
+    def snapshot(self) -> types.SimpleNamespace:
+        return types.SimpleNamespace(**self.shown)
+
+    def restore_plan(self, _backup: Path) -> WritePlan:
+        vehicle = Vehicle("ardupilot", "copter", 1, 1, "4.6.3", ())
+        return WritePlan(vehicle, {"COMPASS_MOTCT": 2.0}, {}, {"COMPASS_MOTCT": 0.0}, {})
+
+    def wait_disarmed(self, _seconds: float) -> None:
+        pass
+
+    def restore(self, *_args: Any) -> Outcome:
+        return Outcome(Standing.OFF, Reason.LINK_LOST, "the link was lost")
+
+
+def told(session: FakeSession, capsys: pytest.CaptureFixture[str], *words: str) -> str:
+    commands = Commands(session)  # type: ignore[arg-type]
+    commands.run(words)
+    assert commands.wait(PATIENCE_S)
+    said = capsys.readouterr()
+    return str(said.out + said.err)
+
+
+ALL_FLOWN = Guidance("keep flying", 0.9, missing=(STEADY,))
+
+
+@pytest.mark.parametrize(
+    ("shown", "last"),
+    [
+        ({"armed": True}, "Turn to the right."),
+        ({"armed": True, "guidance": ALL_FLOWN}, "All that a fit needs is flown: land, then"),
+        ({"armed": False}, "Turn to the right."),
+        ({"armed": False, "armed_until_s": 80.0}, "Magcomp fit says whether what was recorded"),
+    ],
+)
+def test_what_to_do_next_is_true_where_nothing_is_fitted_unasked(
+    shown: dict[str, Any], last: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    said = told(FakeSession(**shown), capsys, "status").splitlines()
+    assert "1 min 30 s are recorded into flown.tlog." in said
+    assert said[-1].startswith(last)
+
+
+def test_what_brings_a_vehicle_back_can_be_typed_as_it_is_said(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    session = FakeSession()
+    asked = told(session, capsys, "undo", "my backup.param")
+    assert "Nothing is written yet: magcomp undo 'my backup.param' yes" in asked
+    said = told(session, capsys, "undo", "my backup.param", "yes")
+    command, *words = shlex.split(said.splitlines()[-1])
+    assert (command, words[0], words[2:]) == ("magcomp", "restore", ["yes"])
 
 
 @pytest.mark.slow
