@@ -80,11 +80,13 @@ class Commands:
             self._at_work.join(seconds)
         return self._at_work is None or not self._at_work.is_alive()
 
-    def close(self) -> None:
-        """End what is at work, a write by putting everything back, and close the session."""
+    def stop(self) -> bool:
+        """Have what is at work end, a write by putting everything back; whether all has ended."""
         self._stop.set()
-        if self._at_work is not None:
-            self._at_work.join()
+        return self.wait(0.0)
+
+    def close(self) -> None:
+        """Close the session, once all has ended."""
         self._session.close()
 
     def _guarded(self, work: Callable[[Sequence[str]], None], rest: Sequence[str]) -> None:

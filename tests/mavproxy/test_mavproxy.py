@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib
+import queue
 import shlex
 import sys
 import threading
@@ -35,6 +36,7 @@ class FakeModule:
 
     def __init__(self, mpstate: Any, name: str, description: str) -> None:
         self.mpstate, self.name, self.description = mpstate, name, description
+        self.needs_unloading = False
 
     def add_command(
         self, name: str, callback: Callable[[list[str]], None], description: str, words: list[str]
@@ -50,8 +52,9 @@ class FakeMavproxy:
         self.command_map: dict[str, Any] = {}
         self.completions: dict[str, list[str]] = {}
         self.settings = types.SimpleNamespace(target_system=0)
+        self.modules: list[tuple[Any, Any]] = []
         self._link = mavutil.mavlink_connection(address)
-        self._stop = threading.Event()
+        self._asked: queue.Queue[Callable[[], None]] = queue.Queue()
         self.module: Any = None
 
     def master(self) -> Any:
@@ -63,21 +66,40 @@ class FakeMavproxy:
         self.command_map[name][0](words)
 
     def loop(self) -> None:
-        while not self._stop.is_set():
+        while self.modules:
             packet = self._link.recv_match(blocking=True, timeout=0.05)
-            if packet is not None:
-                self.module.mavlink_packet(packet)
+            for module, _ in list(self.modules):
+                if packet is not None:
+                    module.mavlink_packet(packet)
+                module.idle_task()
+                if module.needs_unloading:
+                    self._unload()
+            with contextlib.suppress(queue.Empty):
+                self._asked.get_nowait()()
+
+    def unload(self) -> None:
+        """Ask for what `module unload` does; see whether `modules` is empty."""
+        self._asked.put(self._unload)
+
+    def _unload(self) -> None:
+        """As MAVProxy does it: nothing is read until the module has let it."""
+        module = self.modules[0]
+        thread = threading.Thread(target=module[0].unload)
+        thread.start()
+        thread.join(5.0)
+        self.modules.remove(module)
 
     @contextlib.contextmanager
     def running(self) -> Iterator[FakeMavproxy]:
         self.module = magcomp.init(self)
+        self.modules.append((self.module, magcomp))
         thread = threading.Thread(target=self.loop)
         thread.start()
         try:
             yield self
         finally:
-            self.module.unload()
-            self._stop.set()
+            if self.modules:
+                self.unload()
             thread.join()
             self._link.close()
 
@@ -132,6 +154,32 @@ def test_it_is_loaded_listens_and_tells_what_it_can(capsys: pytest.CaptureFixtur
         assert "A backup must be given" in prompt("magcomp undo yes")
         assert "must" in prompt("magcomp fit /nowhere/x.param")
     assert "magcomp" not in mavproxy.command_map
+
+
+def test_a_write_that_is_unloaded_is_put_back_first(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    vehicle = landed()
+    before = held(vehicle)
+    backup = tmp_path / "b.param"
+    ids = {f"COMPASS_DEV_ID{n}": vehicle.parameters[f"COMPASS_DEV_ID{n}"] for n in ("", 2, 3)}
+    write_parameter_file(backup, ParameterSet({**COMPENSATION, **ids}))
+    with (
+        alive(vehicle=vehicle, speed=SPEED) as flown,
+        FakeMavproxy(flown.address).running() as mavproxy,
+    ):
+        Prompt(mavproxy, capsys).until("magcomp status", "calibration is read")
+        mavproxy.type(f"magcomp undo {backup} yes")
+        said = ""
+        while "magcomp: switching the motor compensation off" not in said:
+            threading.Event().wait(0.02)
+            said += capsys.readouterr().err
+        mavproxy.unload()
+    said = capsys.readouterr().err
+    assert "it was interrupted" in said
+    assert "everything as before" in said
+    assert held(vehicle) == before
+    assert not mavproxy.modules
 
 
 @pytest.mark.slow
