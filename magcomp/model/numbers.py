@@ -1,4 +1,4 @@
-"""Numbers as they stand in a file or a frame, made into numbers to reckon with; their median, and steps."""
+"""Numbers of a file or a frame made into numbers to reckon with; their median, and usual steps."""
 
 from __future__ import annotations
 
