@@ -1,6 +1,6 @@
 """What a fleet's run costs beside the fits themselves, and how long its overview takes.
 
-    python benchmarks/fleet.py [--rows 100000] [--log LOG] [--logs FOLDER]
+    python benchmarks/fleet.py [--rows 100000] [--log LOG] [--logs FOLDER [--only-logs]]
 
 Times are of the processor, so that a busy machine disturbs them little; with --logs also the wall
 time of one worker against two, which only an idle machine tells.
@@ -13,13 +13,14 @@ import gc
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from magcomp.analysis import analyse
+from magcomp.fleet import cluster
 from magcomp.fleet.aircraft import aircraft
 from magcomp.fleet.answer import Fleet
 from magcomp.fleet.as_html import html
@@ -27,8 +28,8 @@ from magcomp.fleet.as_text import fleet_text
 from magcomp.fleet.flights import NEEDED, select
 from magcomp.fleet.local import Limits, run
 from magcomp.fleet.places import find
-from magcomp.fleet.row import Log, Row
-from magcomp.fleet.run import carry_out_all, known_of, lost, to_do
+from magcomp.fleet.row import Log, Row, State
+from magcomp.fleet.run import Runner, carry_out_all, known_of, lost, to_do
 from magcomp.fleet.store import Store
 from magcomp.fleet.task import Outcome, Task, carry_out
 from magcomp.process import prepare
@@ -153,25 +154,49 @@ def overview(count: int, like: Path) -> None:
     )
 
 
+def seconds(logs: Sequence[Log], runner: Runner) -> float:
+    """Wall time of logs that are fitted and kept."""
+    with tempfile.TemporaryDirectory() as folder:
+        store = Store(Path(folder))
+        known = known_of(store)
+        start = time.perf_counter()
+        outcomes = list(carry_out_all(logs, known, store, runner, time.monotonic))
+        taken = time.perf_counter() - start
+    gone = [each.rows[0].why for each in outcomes if each.rows[0].state == State.LOST]
+    if gone:
+        sys.exit(f"{len(gone)} logs were lost: {gone[0]}")
+    return taken
+
+
+def local(logs: Sequence[Log], count: int) -> float:
+    """Wall time with worker processes, and their start."""
+    return seconds(logs, lambda tasks: run(tasks, carry_out, lost, Limits(count)))
+
+
+def clustered(logs: Sequence[Log], count: int) -> float:
+    """Wall time with a Dask cluster of processes that stand ready, as on one that is there."""
+    from distributed import LocalCluster  # noqa: PLC0415 - an extra
+
+    with (
+        LocalCluster(  # type: ignore[no-untyped-call]
+            n_workers=count, threads_per_worker=1, dashboard_address=None
+        ) as there,
+        cluster.connected(there.scheduler_address) as client,
+    ):
+        client.run(carry_out, Task(logs[0]))
+        watch = cluster.Watch(print)
+        return seconds(logs, lambda tasks: cluster.run(client, tasks, carry_out, lost, watch))
+
+
 def workers(place: str) -> None:
     """Wall time of one worker and of two over the same logs."""
     logs = find([place])
-    taken = []
-    for count in (1, 2):
-        with tempfile.TemporaryDirectory() as folder:
-            store = Store(Path(folder))
-            known = known_of(store)
-
-            def runner(tasks: Iterable[Task], count: int = count) -> Iterator[Outcome]:
-                return run(tasks, carry_out, lost, Limits(count))
-
-            start = time.perf_counter()
-            list(carry_out_all(logs, known, store, runner, time.monotonic))
-            taken.append(time.perf_counter() - start)
-    print(
-        f"{len(logs)} logs: one worker {taken[0]:.1f} s, two {taken[1]:.1f} s, efficiency "
-        f"{taken[0] / taken[1] / 2:.0%}"
-    )
+    for what, road in (("worker processes", local), ("processes of a Dask cluster", clustered)):
+        one, two = (road(logs, count) for count in (1, 2))
+        print(
+            f"{len(logs)} logs, {what}: one {one:.1f} s, two {two:.1f} s, efficiency "
+            f"{one / two / 2:.0%}"
+        )
 
 
 def main() -> None:
@@ -182,9 +207,11 @@ def main() -> None:
     parser.add_argument("--rows", type=int, default=100_000)
     parser.add_argument("--log", type=Path, default=Path("sitl_fixtures/sweep_current.tlog"))
     parser.add_argument("--logs", help="a folder of logs for one worker against two")
+    parser.add_argument("--only-logs", action="store_true", help="nothing else")
     wanted = parser.parse_args()
-    overhead(wanted.log)
-    overview(wanted.rows, wanted.log)
+    if not wanted.only_logs:
+        overhead(wanted.log)
+        overview(wanted.rows, wanted.log)
     if wanted.logs:
         workers(wanted.logs)
 
