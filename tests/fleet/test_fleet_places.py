@@ -63,7 +63,7 @@ def test_a_log_that_a_server_lacks_is_refused(server: str) -> None:
 def test_a_server_that_is_not_there_is_not_called_empty() -> None:
     with socket.create_server(("127.0.0.1", 0)) as nobody:
         port = nobody.getsockname()[1]
-    with pytest.raises(UsageError, match="must be reachable; instead received: .*connect"):
+    with pytest.raises(UsageError, match=r"must be reachable; instead received: .*connect"):
         find([f"http://127.0.0.1:{port}/"])
 
 
