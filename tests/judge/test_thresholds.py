@@ -160,7 +160,9 @@ def test_a_plain_departure_from_the_model_is_told(monkeypatch, degrees, std, exp
     departure = Departure("curve", degrees, std, 5.0, float("nan"), 1.0)
     monkeypatch.setattr(whole, "departures_of", lambda *_: (departure,))
     monkeypatch.setattr(whole, "used_lags", lambda _: None)
-    problem = SimpleNamespace(control=SimpleNamespace(kind=CURRENT))
+    problem = SimpleNamespace(
+        control=SimpleNamespace(kind=CURRENT), readings=SimpleNamespace(stretch=np.zeros(9))
+    )
     assert grade(whole.on_constancy(problem, fit(), LIMITS, 1.0)) is expected
     assert grade(whole.on_constancy(problem, fit("sweep"), LIMITS, 1.0)) is GOOD
 
@@ -183,7 +185,9 @@ def test_two_levels_do_not_show_that_the_shift_is_straight(
     departure = Departure("curve", bend_deg / 2, bend_deg / 4, 5.0, float("nan"), 1.0)
     monkeypatch.setattr(whole, "departures_of", lambda *_: (departure,))
     monkeypatch.setattr(whole, "used_lags", lambda _: None)
-    problem = SimpleNamespace(control=SimpleNamespace(kind=CURRENT))
+    problem = SimpleNamespace(
+        control=SimpleNamespace(kind=CURRENT), readings=SimpleNamespace(stretch=np.zeros(9))
+    )
     of = fit(
         "levels",
         levels=tuple(SimpleNamespace(u=u) for u in held),
