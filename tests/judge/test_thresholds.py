@@ -153,11 +153,19 @@ def test_the_calibration_in_force_is_judged_by_its_error_and_its_bound(before, p
 
 
 @pytest.mark.parametrize(
-    ("degrees", "std", "expected"),
-    [(0.9, 0.1, GOOD), (1.1, 0.1, MARGINAL), (1.1, 0.4, GOOD), (6.1, 0.1, REJECTED)],
+    ("kind", "degrees", "std", "expected"),
+    [
+        ("curve", 0.9, 0.1, GOOD),
+        ("curve", 1.1, 0.1, MARGINAL),
+        ("curve", 6.1, 0.1, REJECTED),
+        ("curve", 1.7, 0.55, MARGINAL),
+        ("curve", 1.7, 0.58, GOOD),
+        ("motors", 1.7, 0.47, MARGINAL),
+        ("motors", 1.7, 0.5, GOOD),
+    ],
 )
-def test_a_plain_departure_from_the_model_is_told(monkeypatch, degrees, std, expected):
-    departure = Departure("curve", degrees, std, 5.0, float("nan"), 1.0)
+def test_a_plain_departure_from_the_model_is_told(monkeypatch, kind, degrees, std, expected):
+    departure = Departure(kind, degrees, std, 5.0, float("nan"), 1.0)
     monkeypatch.setattr(whole, "departures_of", lambda *_: (departure,))
     monkeypatch.setattr(whole, "used_lags", lambda _: None)
     problem = SimpleNamespace(
