@@ -186,6 +186,8 @@ def _done(
             if future.status == "cancelled":
                 _threads(client)
             yield running.pop(future), future
+            # What a worker still holds as it dies would be done once more, for nobody.
+            future.release()
             fill()
     finally:
         # A scheduler that is gone has nothing left to cancel.

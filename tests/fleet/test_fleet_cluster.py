@@ -95,6 +95,9 @@ class Future:
     def exception(self) -> Exception:
         return KilledWorker()
 
+    def release(self) -> None:
+        self.status = "released"
+
     def end(self, status: str) -> None:
         self.status = status
         for tell in self._told:
@@ -107,11 +110,13 @@ class Client:
     def __init__(self, looks: Iterable[int | str]) -> None:
         self.status = "running"
         self.cancelled: list[Future] = []
+        self.given: list[Future] = []
         self._looks = iter(looks)
         self._work: list[Future] = []
 
     def submit(self, work: Callable[[int], int], task: int, *, pure: bool) -> Future:
         self._work.append(Future(work(task)))
+        self.given.append(self._work[-1])
         return self._work[-1]
 
     def nthreads(self) -> dict[str, int]:
@@ -154,6 +159,13 @@ def test_a_cluster_that_has_lost_its_workers_says_so_once_and_goes_on_when_one_i
     assert "no worker has been there for 30 s" in waits
     assert "Ctrl-C" in waits
     assert "goes on" in back
+
+
+@pytest.mark.usefixtures("at_once")
+def test_no_worker_holds_what_was_taken() -> None:
+    client = Client(itertools.repeat(1))
+    assert len(list(run(client, range(4), double, lost, SILENT))) == 4
+    assert [each.status for each in client.given] == ["released"] * 4
 
 
 @pytest.mark.usefixtures("at_once")
