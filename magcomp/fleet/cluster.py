@@ -144,6 +144,25 @@ def run(
     LinkError
         Where the scheduler is gone.
     """
+    suspects = []
+    for task, future in _done(client, tasks, work, watch):
+        if _killed(future):
+            suspects.append(task)
+        else:
+            yield _outcome(task, future, lost)
+    # Who was in hand of a worker that died is blamed with the one it died of: alone only one is.
+    for suspect in suspects:
+        for task, future in _done(client, [suspect], work, watch):
+            yield _outcome(task, future, lost)
+
+
+def _done(
+    client: Any,
+    tasks: Iterable[_Task],
+    work: Callable[[_Task], _Result],
+    watch: Watch,
+) -> Iterator[tuple[_Task, Any]]:
+    """Tasks that have come to an end, however, as they do."""
     waiting = iter(tasks)
     running: dict[Any, _Task] = {}
     done: SimpleQueue[Any] = SimpleQueue()
@@ -163,13 +182,12 @@ def run(
             except Empty:
                 watch.look(len(_threads(client)))
                 continue
-            task = running.pop(future)
-            if future.status == "finished":
-                yield future.result()
-            else:
-                # A scheduler that is gone cancels all, and no log is to blame for that.
+            # A scheduler that is gone cancels all, and no log is to blame for that.
+            if future.status == "cancelled":
                 _threads(client)
-                yield lost(task, _why(future))
+            yield running.pop(future), future
+            # What a worker still holds as it dies would be done once more, for nobody.
+            future.release()
             fill()
     finally:
         # A scheduler that is gone has nothing left to cancel.
@@ -191,10 +209,19 @@ def _threads(client: Any) -> dict[str, int]:
     return threads
 
 
-def _why(future: Any) -> str:
+def _killed(future: Any) -> bool:
+    """Whether every worker that tried it died."""
+    return future.status == "error" and type(future.exception()).__name__ == "KilledWorker"
+
+
+def _outcome(task: _Task, future: Any, lost: Callable[[_Task, str], _Result]) -> _Result:
+    if future.status == "finished":
+        result: _Result = future.result()
+        return result
     if future.status == "cancelled":
-        return "the cluster must carry it out; instead it was cancelled there"
+        return lost(task, "the cluster must carry it out; instead it was cancelled there")
+    if _killed(future):
+        return lost(task, "its worker must live; instead every one that tried it died")
     error = future.exception()
-    if type(error).__name__ == "KilledWorker":
-        return "its worker must live; instead every one that tried it died"
-    return f"the cluster must carry it out; instead it failed: {type(error).__name__}: {error}"
+    why = f"the cluster must carry it out; instead it failed: {type(error).__name__}: {error}"
+    return lost(task, why)
