@@ -85,6 +85,19 @@ def _version() -> str:
     return __version__
 
 
+def in_this_version(version: str, work: Callable[[_Task], _Result], task: _Task) -> _Result:
+    """Work of a worker, which may have come after the others were asked for their versions.
+
+    Raises
+    ------
+    UsageError
+        Where it has another magcomp: what that found must not stand among results of this one.
+    """
+    if version != __version__:
+        raise UsageError(f"a worker must have magcomp {version}; instead it has {__version__}")
+    return work(task)
+
+
 class Watch:
     """Says when a cluster has had no worker for a while, and when it has one again.
 
@@ -170,7 +183,7 @@ def _done(
     def fill() -> None:
         room = max(_AHEAD * sum(_threads(client).values()), 1) - len(running)
         for task in islice(waiting, max(room, 0)):
-            future = client.submit(work, task, pure=False)
+            future = client.submit(in_this_version, __version__, work, task, pure=False)
             running[future] = task
             future.add_done_callback(done.put)
 

@@ -5,13 +5,15 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager
+from functools import partial
 from typing import Any
 
 import pytest
 from fleet_toys import die_of_three, double, fail_of_three
 
+from magcomp import __version__
 from magcomp.errors import LinkError
-from magcomp.fleet.cluster import Watch, connected, run
+from magcomp.fleet.cluster import Watch, connected, in_this_version, run
 
 SILENT = Watch(lambda text: None)
 
@@ -47,6 +49,18 @@ def test_a_piece_that_fails_is_lost_alone(scheduler: str) -> None:
     (failed,) = [each for each in results if isinstance(each, tuple)]
     assert failed == (3, "the cluster must carry it out; instead it failed: ValueError: three")
     assert len(results) == 6
+
+
+def test_a_worker_of_another_version_that_came_later_finds_nothing(
+    scheduler: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    other = partial(in_this_version, "another version")
+    monkeypatch.setattr(
+        "magcomp.fleet.cluster.in_this_version", lambda _, work, task: other(work, task)
+    )
+    with connected(scheduler) as client:
+        ((_, why),) = run(client, [1], double, lost, SILENT)
+    assert f"must have magcomp another version; instead it has {__version__}" in why
 
 
 def test_the_scheduler_is_not_given_all_at_once(scheduler: str) -> None:
@@ -114,8 +128,8 @@ class Client:
         self._looks = iter(looks)
         self._work: list[Future] = []
 
-    def submit(self, work: Callable[[int], int], task: int, *, pure: bool) -> Future:
-        self._work.append(Future(work(task)))
+    def submit(self, work: Callable[..., int], *given: object, pure: bool) -> Future:
+        self._work.append(Future(work(*given)))
         self.given.append(self._work[-1])
         return self._work[-1]
 
@@ -202,9 +216,9 @@ class Deadly(Client):
         super().__init__([])
         self._still = False
 
-    def submit(self, work: Callable[[int], int], task: int, *, pure: bool) -> Future:
+    def submit(self, work: Callable[..., int], *given: object, pure: bool) -> Future:
         self._still = False
-        return super().submit(work, task, pure=pure)
+        return super().submit(work, *given, pure=pure)
 
     def nthreads(self) -> dict[str, int]:
         if self._still:
