@@ -26,6 +26,9 @@ _PATIENCE_S = 30.0
 
 _LOOK_S = 2.0
 
+_GIVE_S = 10.0
+"""Time for a worker to give a result, some kB, away."""
+
 
 @contextmanager
 def connected(address: str) -> Iterator[Any]:
@@ -162,11 +165,11 @@ def run(
         if _killed(future):
             suspects.append(task)
         else:
-            yield _outcome(task, future, lost)
+            yield _outcome(client, task, future, lost, watch)
     # Who was in hand of a worker that died is blamed with the one it died of: alone only one is.
     for suspect in suspects:
         for task, future in _done(client, [suspect], work, watch):
-            yield _outcome(task, future, lost)
+            yield _outcome(client, task, future, lost, watch)
 
 
 def _done(
@@ -227,10 +230,17 @@ def _killed(future: Any) -> bool:
     return future.status == "error" and type(future.exception()).__name__ == "KilledWorker"
 
 
-def _outcome(task: _Task, future: Any, lost: Callable[[_Task, str], _Result]) -> _Result:
-    if future.status == "finished":
-        result: _Result = future.result()
-        return result
+def _outcome(
+    client: Any, task: _Task, future: Any, lost: Callable[[_Task, str], _Result], watch: Watch
+) -> _Result:
+    # The worker that has the result may die before it gives it away.
+    while future.status not in ("cancelled", "error"):
+        try:
+            result: _Result = future.result(timeout=_GIVE_S)
+        except TimeoutError:
+            watch.look(len(_threads(client)))
+        else:
+            return result
     if future.status == "cancelled":
         return lost(task, "the cluster must carry it out; instead it was cancelled there")
     if _killed(future):

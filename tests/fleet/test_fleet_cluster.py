@@ -103,7 +103,7 @@ class Future:
     def add_done_callback(self, tell: Callable[[Future], None]) -> None:
         self._told.append(tell)
 
-    def result(self) -> int:
+    def result(self, timeout: float) -> int:
         return self._result
 
     def exception(self) -> Exception:
@@ -176,6 +176,26 @@ def test_a_cluster_that_has_lost_its_workers_says_so_once_and_goes_on_when_one_i
 
 
 @pytest.mark.usefixtures("at_once")
+def test_a_result_whose_worker_is_gone_is_not_waited_for_in_silence(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    tries = iter([TimeoutError(), TimeoutError(), 7])
+
+    def result(future: Future, timeout: float) -> int:
+        given = next(tries)
+        if isinstance(given, int):
+            return given
+        raise given
+
+    monkeypatch.setattr(Future, "result", result)
+    told: list[str] = []
+    watch = Watch(told.append, itertools.count(0, 40).__next__)
+    client = Client(itertools.chain([1, 1, 0, 0], itertools.repeat(1)))
+    assert list(run(client, [1], double, lost, watch)) == [7]
+    assert "no worker has been there" in told[0]
+
+
+@pytest.mark.usefixtures("at_once")
 def test_no_worker_holds_what_was_taken() -> None:
     client = Client(itertools.repeat(1))
     assert len(list(run(client, range(4), double, lost, SILENT))) == 4
@@ -222,7 +242,7 @@ class Deadly(Client):
 
     def nthreads(self) -> dict[str, int]:
         if self._still:
-            died = any(each.result() == double(3) for each in self._work)
+            died = any(each.result(0.0) == double(3) for each in self._work)
             for each in self._work:
                 each.end("error" if died else "finished")
             self._work.clear()
