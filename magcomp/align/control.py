@@ -57,7 +57,7 @@ _STEPS_SEEN = 0.4
 _CLEARLY_SMOOTHED = 0.97
 _FEWEST = 2
 _STEPS_OF_SMOOTHING = 4
-_MOST_REGRESSED = 20_000
+_MOST_REGRESSED, _MOST_FOR_EXPONENT = 20_000, 2_000
 _MOST_ROWS, _MOST_ROWS_A_VALUE = 1_000_000, 50
 """More rows in even steps than this mean that the times are not to be trusted."""
 
@@ -281,8 +281,8 @@ def _features(duty: Series, powers: Sequence[float]) -> Series:
     return Series(duty.time, np.array(means).T)
 
 
-def exponent_of(reference: Series, drive: Series, shift: float) -> float:
-    """The power of what drives each motor that a quantity follows best.
+def exponent_of(reference: Series, drive: Series, shift: float) -> tuple[float, float]:
+    """The power of what drives each motor that a quantity follows best, and what it leaves.
 
     Parameters
     ----------
@@ -292,12 +292,18 @@ def exponent_of(reference: Series, drive: Series, shift: float) -> float:
         Of each motor, from 0, shape (n, k).
     shift
         By how many seconds the reference comes later.
+
+    Returns
+    -------
+    tuple of float
+        The power, and the mean square as in :class:`Rebuilt`.
     """
-    few = slice(None, None, -(-len(reference) // _MOST_REGRESSED))
+    few = slice(None, None, -(-len(reference) // _MOST_FOR_EXPONENT))
     told = Series(reference.time[few], reference.value[few])
+    then = Series(told.time, interpolate(drive, told.time - shift))
 
     def cost(power: float) -> float:
-        return _regress(told, _features(drive, (power,)), shift)[1]
+        return _regress(told, _features(then, (power,)), 0.0)[1]
 
     low, high, step = _EXPONENTS
     tried = {power: cost(power) for power in np.arange(low, high, step).tolist()}
@@ -305,7 +311,8 @@ def exponent_of(reference: Series, drive: Series, shift: float) -> float:
         step /= 2.0
         best = min(tried, key=lambda power: tried[power])
         tried |= {power: cost(power) for power in (best - step, best + step)}
-    return float(min(tried, key=lambda power: tried[power]))
+    best = min(tried, key=lambda power: tried[power])
+    return float(best), tried[best]
 
 
 class _Regressed(NamedTuple):

@@ -167,11 +167,11 @@ def _by_powers(
     # Of its largest: powers of volts are far from 1.
     driven = Series(duty.time, drive.series.value / float(drive.series.value.max()))
     shift = float(plain.control.series.time[0] - duty.time[0])
-    power = exponent_of(current, driven, shift)
-    by_law = rebuild(current, driven, MOTORS, "battery current", powers=(power,))
-    if by_law is None or by_law.cost > plain.cost:
+    power, cost = exponent_of(current, driven, shift)
+    if cost > plain.cost:
         return plain, duty, POWERS
-    return by_law, driven, (power,)
+    by_law = rebuild(current, driven, MOTORS, "battery current", powers=(power,))
+    return (plain, duty, POWERS) if by_law is None else (by_law, driven, (power,))
 
 
 def drawn_and_driven(recording: Recording) -> tuple[Control, Control] | None:
