@@ -94,7 +94,8 @@ def _saturates(current: FloatArray, working: FloatArray, top: float) -> bool:
     at_top = current >= top - _SAME_SHARE * max(abs(top), 1.0)
     others = np.unique(current[~at_top], return_counts=True)[1]
     alone = np.count_nonzero(at_top) > _MORE_OFTEN * int(others.max(initial=0))
-    changes = np.std(working[at_top]) > max(_LEAST_CHANGE, _CHANGE_SHARE * np.std(working))
+    usual = float(np.std(working))
+    changes = float(np.std(working[at_top])) > max(_LEAST_CHANGE, _CHANGE_SHARE * usual)
     return bool(np.mean(at_top) > _TOP_SHARE and alone and changes)
 
 
