@@ -106,7 +106,8 @@ def doubted(
     """The chosen fits, none by current good where throttle says another and explains no less.
 
     Two quantities that go together in flight need not go together below it: what was never flown
-    is known only as far as both say the same.
+    is known only as far as both say the same. Which of them the field follows is a matter of the
+    vehicle, so all its compasses together tell which explains less.
 
     Parameters
     ----------
@@ -123,13 +124,16 @@ def doubted(
         return tuple(judged[chosen])
     by_throttle = rivals or [Rival(each.fit, each.held_out) for each in judged.get(THROTTLE, ())]
     by_compass = {rival.fit.compass: rival for rival in by_throttle}
+    both = [each for each in judged[chosen] if each.fit.compass in by_compass]
+    left = [by_compass[each.fit.compass].held_out for each in both]
+    if not both or _typical(left) > _typical([each.held_out for each in both]):
+        return tuple(judged[chosen])
     most = (limits or Thresholds()).good_deg
     return tuple(_doubted(each, by_compass.get(each.fit.compass), most) for each in judged[chosen])
 
 
 def _doubted(each: Judged, rival: Rival | None, most: float) -> Judged:
-    good = each.verdict.grade is Grade.GOOD
-    if not good or rival is None or rival.held_out > each.held_out:
+    if each.verdict.grade is not Grade.GOOD or rival is None:
         return each
     apart = apart_at_rest(each.fit, rival.fit.correction)
     if apart <= most:

@@ -121,6 +121,20 @@ def test_what_throttle_explains_as_well_it_must_not_contradict_at_rest(
     assert doubted({THROTTLE: [good]}, THROTTLE, [rival]) == (good,)
 
 
+def test_all_compasses_tell_together_which_quantity_explains_less(by_current_best):
+    current = by_current_best[1]
+    good = replace(current, verdict=replace(current.verdict, grade=Grade.GOOD))
+    pair = [good, replace(good, fit=replace(good.fit, compass=2))]
+    apart = [moved_at_rest(each.fit, 3.0) for each in pair]
+
+    def grades(*shares: float) -> list[Grade]:
+        rivals = [Rival(f, k * good.held_out) for f, k in zip(apart, shares, strict=True)]
+        return [each.verdict.grade for each in doubted({CURRENT: pair}, CURRENT, rivals)]
+
+    assert grades(0.95, 1.02) == [Grade.MARGINAL] * 2
+    assert grades(0.99, 1.03) == [Grade.GOOD] * 2
+
+
 def moved_at_rest(fit: MotorFit, degrees: float) -> MotorFit:
     """A fit by whatever quantity whose offset turns the heading by so much with the motors off."""
     wrong = fit.correction.offset + np.array([0.0, 1.0, 0.0])
