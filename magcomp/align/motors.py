@@ -9,16 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from magcomp.align.between import expected
-from magcomp.align.control import (
-    POWERS,
-    Rebuilt,
-    duty_of,
-    exponent_of,
-    rebuild,
-    reported,
-    smoothed,
-)
+from magcomp.align.control import duty_of, reported
 from magcomp.align.readings import in_gap
+from magcomp.align.rebuilt import POWERS, Rebuilt, exponent_of, rebuild, smoothed
 from magcomp.model import (
     DRIVE,
     MOTORS,

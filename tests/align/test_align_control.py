@@ -9,7 +9,7 @@ import pytest
 from synthetic import Flown, problem_of
 
 from magcomp.align import controls, reported
-from magcomp.align.control import smoothed
+from magcomp.align.rebuilt import smoothed
 from magcomp.model import (
     CURRENT,
     THROTTLE,

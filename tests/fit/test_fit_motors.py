@@ -17,8 +17,8 @@ from magcomp.align import (
     readings,
     to_undo,
 )
-from magcomp.align.control import exponent_of
 from magcomp.align.motors import drive_of_motors
+from magcomp.align.rebuilt import exponent_of
 from magcomp.fit import Problem, best_form, fit
 from magcomp.fit.field_model import SIZE
 from magcomp.fit.motors import contrasts, differences_of, no_surer_than
