@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from magcomp import autopilots
-from magcomp.align import has_position
+from magcomp.align import has_position, on_lift_alone
 from magcomp.align.readings import is_new
+from magcomp.analysis.missing import HOW_TO_HOVER, hovers
 from magcomp.errors import InputError
 from magcomp.fit import LEAST_READINGS
 from magcomp.model import Compass, Recording, Series
@@ -188,6 +189,7 @@ def _quantities(recording: Recording) -> Iterator[Quantity]:
         ("gyro", recording.gyro, True),
         ("accelerometer", recording.accel, True),
         ("position", recording.position, True),
+        ("hover or forward flight", recording.forward, True),
     ]
     for name, series, used in others:
         if series is not None:
@@ -230,6 +232,9 @@ def _missing(recording: Recording, found: tuple[CompassContents, ...]) -> Iterat
         yield Missing(what, how["more readings"], prevents=True)
     elif all(compass.rate_hz < SLOW_HZ for compass in found):
         yield Missing("a reading of a compass each second", how["more readings"], prevents=False)
+    hover, left_out = on_lift_alone(recording)
+    if left_out and not hovers(hover):
+        yield Missing("a hover", HOW_TO_HOVER, prevents=True)
     yield from _missing_controls(recording, how)
     if recording.attitude is None or len(recording.attitude) < 2:
         yield Missing("the attitude", how["attitude"], prevents=True)

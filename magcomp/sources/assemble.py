@@ -210,6 +210,7 @@ def _recording(decoded: Decoded, source: str, kind: str) -> Recording:
         other_currents=quantities.other_currents(messages),
         esc_currents=quantities.esc_currents(messages),
         raw_compasses=raw,
+        forward=quantities.forward(messages),
     )
 
 

@@ -30,6 +30,8 @@ _CONTROLLERS = (
 )
 _FULL_THROTTLE = 100
 _FIX_3D = 3
+_NEITHER, _HOVERS = 0, 3
+"""EXTENDED_SYS_STATE.vtol_state of a vehicle that has no two phases, and of one that hovers."""
 
 _SIMULATION_PREFIX = "SIM_"
 
@@ -131,6 +133,20 @@ def armed(table: Table) -> FloatArray:
     """1 armed, 0 disarmed for each heartbeat, shape (n,)."""
     state = np.array([is_armed(mode) for mode in range(256)], dtype=np.float64)
     return np.asarray(state[table["base_mode"]])
+
+
+def forward(messages: Messages) -> Series | None:
+    """1 where a VTOL flies on its wings or is in transition; None of any other vehicle.
+
+    It is told about once a second: a row whose next one differs counts as on the way already.
+    """
+    if Message.EXTENDED_SYS_STATE not in messages:
+        return None
+    time, table = messages[Message.EXTENDED_SYS_STATE]
+    rows = table["vtol_state"] != _NEITHER
+    away = table["vtol_state"][rows] != _HOVERS
+    away[:-1] |= away[1:]
+    return Series(time[rows], away.astype(np.float64)) if rows.any() else None
 
 
 def voltage(messages: Messages) -> Series | None:
