@@ -199,6 +199,11 @@ def quoted(result: CompassResult) -> dict[str, float | bool]:
     }
 
 
+def quoted_row(quoted: Mapping[str, float]) -> HeadingError:
+    """The row that :func:`quoted` tells of."""
+    return HeadingError(*(quoted[name] for name in ("u", "before", "after", "p95")))
+
+
 def _hover(verdict: Verdict) -> float:
     """The control quantity in use half of the time, or the middle of what was covered."""
     covered = verdict.coverage

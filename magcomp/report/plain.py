@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from magcomp.model import Grade, quantity_of
+from magcomp.model import Grade, HeadingError, quantity_of
 from magcomp.report import words
 
 Document = Mapping[str, Any]
@@ -76,11 +76,25 @@ def _takes_out(compass: Mapping[str, Any]) -> bool:
     return compass["method"] == "sweep" and math.hypot(*part) > _SURELY * math.hypot(*doubt)
 
 
+def reads_as_quoted(row: Mapping[str, Any], compass: Mapping[str, Any]) -> bool:
+    """Whether a row's control quantity is written as that of the row that is quoted."""
+    by, quoted = compass["regressor"], compass["quoted"]
+    return words.quantity(row["u"], by) == words.quantity(quoted["u"], by)
+
+
+def with_quoted(
+    table: Sequence[HeadingError], quoted: HeadingError, regressor: str
+) -> list[HeadingError]:
+    """A table with the quoted row in its place, instead of one that is written alike."""
+    own = words.quantity(quoted.u, regressor)
+    others = [row for row in table if words.quantity(row.u, regressor) != own]
+    return sorted([*others, quoted], key=lambda row: row.u)
+
+
 def table_rows(compass: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     """The heading errors of one compass of the document, with the row that is quoted among them."""
-    quoted = compass["quoted"]
-    rows = [row for row in compass["heading_error_deg"] if row["u"] != quoted["u"]]
-    return sorted([*rows, quoted], key=lambda row: float(row["u"]))
+    rows = [row for row in compass["heading_error_deg"] if not reads_as_quoted(row, compass)]
+    return sorted([*rows, compass["quoted"]], key=lambda row: float(row["u"]))
 
 
 def check_line(document: Document) -> str:

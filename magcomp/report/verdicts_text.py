@@ -64,7 +64,9 @@ def of_analysis(
     """Those of an analysis."""
     document = as_json.analysis_object(analysis) if document is None else document
     results = [
-        Finding(c.fit.compass, c.verdict, c.fit.regressor, _row_of(found["quoted"]), verbose)
+        Finding(
+            c.fit.compass, c.verdict, c.fit.regressor, as_json.quoted_row(found["quoted"]), verbose
+        )
         for c, found in zip(analysis.compasses, document["compasses"], strict=True)
     ]
     return of_findings(results, ("now", "corrected, at most (95 %)"), BEFORE_AFTER)
@@ -80,10 +82,6 @@ def of_check(
         at = None if row is None else error_at(verdict.heading_error, row["u"])
         results.append(Finding(found["compass"], verdict, found["regressor"], at, compares=False))
     return of_findings(results, ("in force", "at most (95 %)"), ("red", "yellow"))
-
-
-def _row_of(quoted: Mapping[str, float]) -> HeadingError:
-    return HeadingError(*(quoted[name] for name in ("u", "before", "after", "p95")))
 
 
 def of_findings(
@@ -112,9 +110,7 @@ def _rows(finding: Finding) -> Iterator[Row]:
     quoted, covered = finding.quoted, finding.verdict.coverage
     table = list(finding.verdict.heading_error)
     if quoted is not None:
-        near = {words.quantity(quoted.u, finding.regressor)}
-        table = [row for row in table if words.quantity(row.u, finding.regressor) not in near]
-        table = sorted([*table, quoted], key=lambda row: row.u)
+        table = plain.with_quoted(table, quoted, finding.regressor)
     for row in table:
         u = words.quantity(row.u, finding.regressor)
         flown = words.is_flown(row.u, covered.u_low, covered.u_high)
