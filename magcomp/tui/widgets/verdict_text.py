@@ -60,7 +60,7 @@ class ReasonLine(Drawn[tuple[str, str, Grade, str]]):
         self.draw_data(("" if rejected else line, doubt[0], grade, doubt[1]))
 
     def picture(self, data: tuple[str, str, Grade, str], width: int, height: int) -> Content:  # noqa: ARG002
-        """What to do, whole, and one line or two of why; what does not fit stands in the verdict."""
+        """What to do, and in a line or two why; what does not fit stands in the verdict."""
         line, title, grade, reason = data
         most = 1 if line and width < _NARROW else 2
 
