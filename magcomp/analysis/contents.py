@@ -13,7 +13,7 @@ from magcomp.align.readings import is_new
 from magcomp.analysis.missing import HOW_TO_HOVER, hovers
 from magcomp.errors import InputError
 from magcomp.fit import LEAST_READINGS
-from magcomp.model import Compass, Recording, Series
+from magcomp.model import CURRENT, THROTTLE, Compass, Recording, Series
 
 SLOW_HZ = 0.8
 """Fewer readings than this of a compass a second leave turns of a minute with too few."""
@@ -245,9 +245,15 @@ def _missing(recording: Recording, found: tuple[CompassContents, ...]) -> Iterat
 
 
 def _missing_controls(recording: Recording, how: Mapping[str, str]) -> Iterator[Missing]:
-    told = [each for each in (recording.current, recording.throttle) if each is not None]
-    if not told:
+    autopilot, kind = autopilots.of(recording), recording.vehicle.kind
+    can = autopilot.multiplied(recording.vehicle)
+    both = {CURRENT: recording.current, THROTTLE: recording.throttle}
+    told = [each for kind, each in both.items() if kind in can and each is not None]
+    if recording.current is None and recording.throttle is None:
         yield Missing("a battery current and a throttle", how["control"], prevents=True)
+    elif not told:
+        what = f"a {' or '.join(can)}, which is all that {autopilot.title} multiplies in a {kind}"
+        yield Missing(what, how["current"], prevents=True)
     elif not any(len(each) > 1 and np.ptp(each.value) > 0.0 for each in told):
         yield Missing(
             "a current or a throttle that changes", "arm, and use the motors", prevents=True

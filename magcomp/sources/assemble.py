@@ -146,7 +146,7 @@ def decode_vehicle(
     tables = {message: decode(octets, frames[rows[message]], message) for message in rows}
     let_go(octets)
     stamp = _stamps(len(frames), rows, tables)
-    copies = repeated(frames, stamp)
+    copies = repeated(frames, stamp, rows)
     if copies.any():
         tables = {message: tables[message][~copies[rows[message]]] for message in rows}
         frames, stamp = frames[~copies], stamp[~copies]

@@ -220,16 +220,22 @@ def parameters(messages: Messages, autopilot: str, simulation: bool) -> list[Par
     if Message.PARAM_VALUE not in messages:
         return []
     time, table = messages[Message.PARAM_VALUE]
+    simulated = _begin_with(table["param_id"], _SIMULATION_PREFIX)
+    rows = simulated if simulation else ~simulated
+    if not rows.all():
+        time, table = time[rows], table[rows]
     how = encoding(autopilot, capabilities(messages))
     value = decode_values(table["param_value"], table["param_type"], how)
-    names = text(table["param_id"])
-    rows = zip(time.tolist(), names, value.tolist(), strict=True)
+    each = zip(time.tolist(), text(table["param_id"]), value.tolist(), strict=True)
     # Nothing here is a Python call for each of a log's thousand parameters.
-    changes = map(tuple.__new__, repeat(ParameterChange), rows)
-    simulated = {name for name in set(names) if name.startswith(_SIMULATION_PREFIX)}
-    if not simulated and not simulation:
-        return list(changes)
-    return [change for change in changes if (change[1] in simulated) is simulation]
+    return list(map(tuple.__new__, repeat(ParameterChange), each))
+
+
+def _begin_with(names: NDArray[np.bytes_], prefix: str) -> NDArray[np.bool_]:
+    """Which of some names of a fixed width begin so, shape (n,)."""
+    wanted = np.frombuffer(prefix.encode("ascii"), np.uint8)
+    letters = np.ascontiguousarray(names).view(np.uint8).reshape(len(names), -1)
+    return np.asarray((letters[:, : len(wanted)] == wanted).all(axis=1))
 
 
 def holds_whole_list(messages: Messages) -> bool:
