@@ -22,9 +22,6 @@ class Kept(StrEnum):
     NO = "✗"
 
 
-_ORDER = tuple(Kept)
-"""Best first."""
-
 _MEANING = {
     Kept.YES: "",
     Kept.UNSURE: ": more than promised, but this flight cannot tell it so finely",
@@ -47,7 +44,7 @@ class Promise:
     measured, doubt
         Heading error that the flight shows, and what it may be more or less (95 %), degrees.
     elsewhere
-        The same where less is left of the promise than here; None where it is kept as well.
+        The same at another control quantity where it is broken and here it is not; else None.
     """
 
     compass: int
@@ -107,8 +104,8 @@ def promises(analysis: Analysis, verdicts: Mapping[int, Verdict]) -> tuple[Promi
         u = float(np.clip(quoted(result)["u"], rows[0].u, rows[-1].u))
         here = _promise(result, error_at(rows, u))
         least = max((_promise(result, row) for row in rows), key=_broken_by)
-        is_worse = _ORDER.index(least.kept) > _ORDER.index(here.kept)
-        found.append(replace(here, elsewhere=least if is_worse else None))
+        broken = least.kept is Kept.NO and here.kept is not Kept.NO
+        found.append(replace(here, elsewhere=least if broken else None))
     return tuple(found)
 
 
@@ -119,5 +116,5 @@ def _promise(result: CompassResult, measured: HeadingError) -> Promise:
     return Promise(fit.compass, measured.u, fit.regressor, promised, measured.before, doubt)
 
 
-def _broken_by(promise: Promise) -> tuple[int, float]:
-    return _ORDER.index(promise.kept), promise.measured - promise.promised
+def _broken_by(promise: Promise) -> tuple[bool, float]:
+    return promise.kept is Kept.NO, promise.measured - promise.promised
