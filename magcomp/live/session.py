@@ -16,7 +16,7 @@ from typing import Self, TypeVar
 
 from magcomp.analysis.analyse import Options, Progress, analyse
 from magcomp.buffer import Buffer
-from magcomp.errors import LinkError, LinkTimeoutError, MagcompError
+from magcomp.errors import InputError, LinkError, LinkTimeoutError, MagcompError
 from magcomp.link import (
     DEFAULT_RATES,
     GROUND_STATION_SYSTEM,
@@ -274,8 +274,15 @@ class LiveSession:
         ------
         InputError
             There is too little for a fit.
+        LinkError, LinkTimeoutError
+            There is too little, because the vehicle could not be asked.
         """
-        return analyse(self.recording(), options, progress)
+        try:
+            return analyse(self.recording(), options, progress)
+        except InputError as error:
+            if self._preparation.failure is not None:
+                raise self._preparation.failure from error
+            raise
 
     def listen(self, sink: FrameSink) -> None:
         """Give a sink every frame from now on, in the link's thread."""

@@ -252,14 +252,15 @@ class Watch:
             return self._preparation.trouble or "waiting for a heartbeat"
         if not up:
             return "the link is lost; trying again"
-        return self._preparation.trouble or "connected"
+        return "connected"
 
     def _warnings(
         self, now: Now, vehicle: Vehicle | None, parameters: Mapping[str, float]
     ) -> tuple[str, ...]:
         if vehicle is None:
             return ()
-        since = self._preparation.streaming_since
+        preparation = self._preparation
+        since = None if preparation.failure is not None else preparation.streaming_since
         streaming = 0.0 if since is None else self._clock.monotonic() - since
         asked, received = self._connection.requested_rates, self._connection.statistics().rates
         slow = next(slow_streams(asked, received, streaming), "")
@@ -273,8 +274,9 @@ class Watch:
         ended, gap = self._gap
         if self._clock.monotonic() - ended < _GAP_TOLD_S:
             found.append(gap)
-        if self._preparation.failure is not None:
-            found.insert(0, str(self._preparation.failure).rstrip("."))
+        trouble = str(preparation.failure or "") or preparation.trouble
+        if trouble and preparation.over.is_set():
+            found.insert(0, trouble.rstrip("."))
         if self._tap.failure:
             found.insert(0, self._tap.failure.rstrip("."))
         return tuple(found)

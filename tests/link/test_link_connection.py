@@ -285,7 +285,8 @@ class TestWhyNot:
         stranger.close()
 
     def test_frames_of_another_kind_are_named(self):
-        radio = FakeVehicle(autopilot=mavlink.MAV_AUTOPILOT_INVALID, kind=mavlink.MAV_TYPE_GCS)
+        identity = {"autopilot": mavlink.MAV_AUTOPILOT_INVALID, "kind": mavlink.MAV_TYPE_GCS}
+        radio = FakeVehicle(heartbeat_s=0.0, **identity)
         address, living = over_udp(radio)
         with living:
             message = self.silent(address, timeout=0.5)
@@ -293,7 +294,7 @@ class TestWhyNot:
         assert "HEARTBEAT" in message
 
     def test_another_system_than_the_one_asked_for_is_named(self):
-        address, living = over_udp(FakeVehicle(system=7))
+        address, living = over_udp(FakeVehicle(system=7, heartbeat_s=0.0))
         with living:
             message = self.silent(address, timeout=0.5, system=3)
         assert "system 3 must be on the link; instead heard system 7" in message
