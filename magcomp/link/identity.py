@@ -8,6 +8,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from magcomp import autopilots
 from magcomp.link.framing import Message
+from magcomp.mavlink.commands import command_long
 from magcomp.mavlink.header import payload
 from magcomp.mavlink.heartbeat import Identity, identify
 from magcomp.mavlink.parameters import decode_param_value, encoding
@@ -98,13 +99,8 @@ class Identification:
             for name in self._missing_ids()
         ]
         if not self._version_known:
-            questions.append(
-                command(
-                    to,
-                    mavlink.MAV_CMD_REQUEST_MESSAGE,
-                    mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
-                )
-            )
+            version = mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION
+            questions.append(command_long(to, mavlink.MAV_CMD_REQUEST_MESSAGE, version))
         return questions
 
     def _known_names(self) -> tuple[str, ...]:
@@ -112,12 +108,6 @@ class Identification:
 
     def _missing_ids(self) -> list[str]:
         return [name for name in self._known_names() if name not in self._device_ids]
-
-
-def command(to: tuple[int, int], number: int, *parameters: float) -> Message:
-    """Make a COMMAND_LONG; parameters left out are 0."""
-    padded = (*parameters, *(0.0,) * (7 - len(parameters)))
-    return mavlink.MAVLink_command_long_message(*to, number, 0, *padded)
 
 
 def _whole(value: float) -> int:

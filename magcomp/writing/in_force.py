@@ -13,6 +13,7 @@ import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from magcomp import autopilots
+from magcomp.mavlink.commands import every
 from magcomp.model import FloatArray, Series, Vehicle
 from magcomp.writing.plan import WritePlan
 from magcomp.writing.writer import Connection, fetch
@@ -158,12 +159,6 @@ def _look(
 
 
 def _ask(connection: Connection, vehicle: Vehicle, names: list[str], interval_us: float) -> None:
-    to = (vehicle.system, vehicle.component)
     numbers = {each.msgname: number for number, each in mavlink.mavlink_map.items()}
     for name in names:
-        rest = [0.0] * 5
-        connection.send(
-            mavlink.MAVLink_command_long_message(
-                *to, mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, 0, numbers[name], interval_us, *rest
-            )
-        )
+        connection.send(every((vehicle.system, vehicle.component), numbers[name], interval_us))
