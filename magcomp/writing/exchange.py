@@ -84,7 +84,6 @@ class Exchange(Generic[Key]):
     def __init__(self, keys: Iterable[Key], timing: Timing) -> None:
         self._open: dict[Key, _Question] = {key: _Question() for key in keys}
         self._timing = timing
-        self._halted = False
         self.total = len(self._open)
         self._askings_of_answered = 0
 
@@ -110,24 +109,14 @@ class Exchange(Generic[Key]):
         needed = math.ceil(math.log(_MISTAKEN) / math.log(failure_rate))
         return min(needed, self._timing.attempts)
 
-    def halt(self) -> None:
-        """Ask nothing more; only what is under way may still be answered."""
-        self._halted = True
-
     def attempts(self, key: Key) -> int:
         """How often an open question has been asked."""
         return self._open[key].attempts
-
-    def idle(self, now: float) -> bool:
-        """Whether no answer is being waited for."""
-        return not any(self._waiting(question, now) for question in self._open.values())
 
     def ask(self, now: float) -> list[tuple[Key, int]]:
         """Questions to be sent now, each with how often it has been asked, this time included."""
         room = self._timing.window - sum(self._waiting(q, now) for q in self._open.values())
         asked: list[tuple[Key, int]] = []
-        if self._halted:
-            return asked
         for key, question in self._open.items():
             if len(asked) >= room:
                 break
@@ -175,7 +164,7 @@ class Exchange(Generic[Key]):
             not self._waiting(q, now) and q.attempts < self._timing.attempts
             for q in self._open.values()
         )
-        if askable and not self._halted and len(waiting) < self._timing.window:
+        if askable and len(waiting) < self._timing.window:
             return now
         return min(waiting, default=now)
 

@@ -47,7 +47,6 @@ class Terminal:
     """The vehicle's end of a pseudo-terminal."""
 
     clock = CLOCK
-    answers = True
 
     def __init__(self) -> None:
         self._master, slave = pty.openpty()
@@ -414,7 +413,6 @@ def test_a_dead_transport_is_told_from_a_silent_one():
 class StalledTransport:
     """A line that takes nothing until it is let go."""
 
-    answers = True
     peer = None
 
     def __init__(self):

@@ -261,7 +261,6 @@ def test_a_journal_tells_what_stands(tmp_path: Path, events: list, standing: Sta
     state = read_journal(backup)
     assert (state.backup, state.standing) == (backup, standing)
     assert state.outcome == next((e for e in events if isinstance(e, Outcome)), None)
-    assert state.needs_restore is (standing in {Standing.OFF, Standing.UNSURE})
 
 
 def test_a_journal_cut_anywhere_still_tells(tmp_path: Path) -> None:
