@@ -21,7 +21,6 @@ from magcomp.link import (
     Replay,
     SinkFailed,
     StrangerHeard,
-    VehicleFound,
     VehicleRebooted,
 )
 from magcomp.link.clock import Clock
@@ -211,8 +210,6 @@ class Watch:
                 self._gap = (self._clock.monotonic(), f"the link was gone for {duration:.0f} s")
             case VehicleRebooted():
                 self._note("the vehicle rebooted")
-            case VehicleFound():
-                self._preparation.trouble = ""
             case StrangerHeard(where=where):
                 self._note(f"somebody else at {where} speaks in the vehicle's name; it is ignored")
             case SinkFailed(error=error):
@@ -274,9 +271,8 @@ class Watch:
         ended, gap = self._gap
         if self._clock.monotonic() - ended < _GAP_TOLD_S:
             found.append(gap)
-        trouble = str(preparation.failure or "") or preparation.trouble
-        if trouble and preparation.over.is_set():
-            found.insert(0, trouble.rstrip("."))
+        if preparation.over.is_set() and preparation.trouble:
+            found.insert(0, preparation.trouble.rstrip("."))
         if self._tap.failure:
             found.insert(0, self._tap.failure.rstrip("."))
         return tuple(found)
