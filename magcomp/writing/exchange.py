@@ -147,7 +147,15 @@ class Exchange(Generic[Key]):
         return question.differing
 
     def unanswered(self, now: float, attempts: int | None = None) -> tuple[Key, ...]:
-        """Questions that stayed without answer as often as they are asked at all."""
+        """Questions that stayed without answer each time they were asked.
+
+        Parameters
+        ----------
+        now
+            The time, seconds.
+        attempts
+            So many times; as often as anything is asked at all unless given.
+        """
         limit = self._timing.attempts if attempts is None else attempts
         return tuple(
             key
