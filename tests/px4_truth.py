@@ -7,7 +7,7 @@ taken from magcomp: these are what its answers are held against.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -98,22 +98,41 @@ def through_dead_zones(
     return found
 
 
+def left_deg(
+    truth: Truth, sensor: Sensor, correct: Callable[[FloatArray, float], FloatArray]
+) -> float:
+    """The largest heading error from no power to the top, level and tilted, degrees.
+
+    ``correct`` makes the vehicle's field of what the sensor says, gauss, shape (n, 3), at a power.
+    """
+    worst = 0.0
+    for power in np.linspace(0.0, truth.top, 5):
+        for roll, pitch in TILTS:
+            body = body_from_earth(roll, pitch, YAWS) @ truth.earth
+            corrected = correct(sensor.reading(body, power), power)
+            found = heading(corrected, roll, pitch, truth.declination)
+            worst = max(worst, float(np.abs(wrap_angle(found - YAWS)).max()))
+    return float(np.degrees(worst))
+
+
 def heading_error_deg(
     truth: Truth, sensor: Sensor, stored: Mapping[str, float], emitted: Mapping[str, float]
 ) -> float:
-    """The largest error from no power to the top, level and tilted, restarted or not, degrees."""
+    """That of the emitted parameters, whether the vehicle is restarted or not, degrees."""
     slot = slot_of(stored, sensor.device)
     after = {**stored, **emitted}
     running = through_dead_zones(AT_START, stored, slot)
-    worst = 0.0
-    for before in (running, AT_START):
-        force = through_dead_zones(before, after, slot)
+
+    def firmware(force: Mapping[str, FloatArray]) -> Callable[[FloatArray, float], FloatArray]:
         soft_iron = matrix(force["SCALE"], force["ODIAG"])
-        for power in np.linspace(0.0, truth.top, 5):
-            for roll, pitch in TILTS:
-                body = body_from_earth(roll, pitch, YAWS) @ truth.earth
-                sensed = sensor.reading(body, power) + power * force["COMP"] - force["OFF"]
-                corrected = sensed @ soft_iron.T @ sensor.rotation.T
-                found = heading(corrected, roll, pitch, truth.declination)
-                worst = max(worst, float(np.abs(wrap_angle(found - YAWS)).max()))
-    return float(np.degrees(worst))
+
+        def correct(sensed: FloatArray, power: float) -> FloatArray:
+            moved = sensed + power * force["COMP"] - force["OFF"]
+            return np.asarray(moved @ soft_iron.T @ sensor.rotation.T)
+
+        return correct
+
+    return max(
+        left_deg(truth, sensor, firmware(through_dead_zones(before, after, slot)))
+        for before in (running, AT_START)
+    )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from magcomp import autopilots
-from magcomp.model import FloatArray, Recording, Series
+from magcomp.model import FloatArray, Recording, Series, usual_steps
 
 _FROZEN_S = 5.0
 _SILENT_S = 1.5
@@ -121,21 +121,26 @@ def _silent(reported: Series, recording: Recording) -> str:
     if recording.attitude is None or len(recording.attitude) < 2:
         return ""
     step = np.diff(reported.time)
-    limit = max(_SILENT_S, _SILENT_STEPS * float(np.median(step)))
     heard = recording.attitude.time
-    usual_step = float(np.median(np.diff(heard)))
+    usual_of_heard = usual_steps(np.diff(heard))
     lost = 0.0
-    for index in np.flatnonzero(step > limit).tolist():
+    for index in np.flatnonzero(step > _longest(step)).tolist():
         first, last = float(reported.time[index]), float(reported.time[index + 1])
-        inside = np.count_nonzero((heard > first) & (heard < last))
-        # Not divided by the step: it is 0 where most attitudes tell the time of another.
-        lost += last - first if inside * usual_step > 0.6 * (last - first) else 0.0
+        begin, end = np.searchsorted(heard, (first, last))
+        # Not divided by the steps: they are 0 where most attitudes tell the time of another.
+        spoken = float(np.sum(usual_of_heard[begin:end]))
+        lost += last - first if spoken > 0.6 * (last - first) else 0.0
     if lost < _SILENT_SHARE * float(np.ptp(reported.time)):
         return ""
     return (
         f"drops out: it is missing or zero for {lost:.0f} s in all while the rest of the vehicle "
         "goes on; check its wiring"
     )
+
+
+def _longest(step: FloatArray) -> FloatArray:
+    """The longest step near each that is no silence yet, seconds, shape (n,)."""
+    return np.maximum(_SILENT_S, _SILENT_STEPS * usual_steps(step))
 
 
 def _wild(reported: Series) -> str:

@@ -1,8 +1,8 @@
 """Hover and forward flight of a quadplane: two sources of interference, told apart.
 
 In forward flight the lift motors rest and a pusher draws the current, through other wires. One
-vector fits neither where both are mixed. A firmware that says in which it is, is believed; of
-others the outputs tell.
+vector fits neither where both are mixed. A firmware that says in which it is, is believed; where
+outputs tell that a pusher runs, that is left out too.
 """
 
 from __future__ import annotations
@@ -26,7 +26,6 @@ _DRAWING = 0.15
 
 _LEAST_SHARE = 0.02
 _MARGIN_S = 1.0
-_STEP_S = 0.5
 
 
 def on_lift_alone(recording: Recording) -> tuple[Recording, str]:
@@ -39,49 +38,58 @@ def on_lift_alone(recording: Recording) -> tuple[Recording, str]:
     str
         Empty where nothing was left out.
     """
-    said = _said(recording)
-    pushed = _pushed(recording) if said is None else said
-    if pushed is None:
-        return recording, ""
-    time, away, share = pushed
-    if share < _LEAST_SHARE:
+    both = {
+        "the vehicle flies forward": _said(recording),
+        "a pusher drives the vehicle": _pushed(recording),
+    }
+    told = {words: found for words, found in both.items() if found and found[1] >= _LEAST_SHARE}
+    if not told:
         return recording, ""
 
     def kept(series: Series) -> Series:
-        hover = ~_near(series.time, time[away])
+        hover = np.ones(len(series), dtype=bool)
+        for away, _ in told.values():
+            hover &= ~_near(series.time, away)
         return Series(series.time[hover], series.value[hover])
 
-    field = {compass: kept(series) for compass, series in recording.field.items()}
-    current = None if recording.current is None else kept(recording.current)
-    what = "a pusher drives the vehicle" if said is None else "the vehicle flies forward"
-    told = (
-        f"{what} in {100.0 * share:.0f} % of the time its motors work: only "
+    words, (_, share) = next(iter(told.items()))
+    current, throttle = recording.current, recording.throttle
+    attitude = recording.attitude
+    hover = replace(
+        recording,
+        field={compass: kept(series) for compass, series in recording.field.items()},
+        current=None if current is None else kept(current),
+        throttle=None if throttle is None else kept(throttle),
+        # A compass that is silent while the vehicle goes on talking would have dropped out.
+        attitude=None if attitude is None else kept(attitude),
+    )
+    return hover, (
+        f"{words} in {100.0 * share:.0f} % of the time its motors work: only "
         "what was flown on the lift motors alone is used, and the answer holds for hovering, for a "
         "pusher's current disturbs in its own way"
     )
-    return replace(recording, field=field, current=current), told
 
 
-def _said(recording: Recording) -> tuple[FloatArray, BoolArray, float] | None:
+def _said(recording: Recording) -> tuple[Series, float] | None:
     """The same by what the firmware says of itself; None where it does not."""
-    forward, current = recording.forward, recording.current
-    if forward is None or not len(forward) or current is None or not len(current):
+    forward = recording.forward
+    drawn = recording.throttle if recording.current is None else recording.current
+    if forward is None or not len(forward) or drawn is None or not len(drawn):
         return None
-    time = np.arange(forward.time[0], max(forward.time[-1], current.time[-1]), _STEP_S)
-    last = np.searchsorted(forward.time, time, side="right") - 1
-    away = forward.value[last] > 0.0
-    busy = np.interp(time, current.time, current.value) > _least_drawn(current)
-    share = float(np.mean(away[busy])) if busy.any() else 0.0
-    return time, np.asarray(away), share
+    told = drawn.time >= forward.time[0]
+    busy = drawn.time[told & (drawn.value > _least_drawn(drawn))]
+    last = np.searchsorted(forward.time, busy, side="right") - 1
+    share = float(np.mean(forward.value[last] > 0.0)) if len(busy) else 0.0
+    return forward, share
 
 
-def _least_drawn(current: Series) -> float:
-    """What motors draw at least, A."""
-    return _DRAWING * float(np.quantile(current.value, 0.98))
+def _least_drawn(drawn: Series) -> float:
+    """What motors draw at least, in the series' unit."""
+    return _DRAWING * float(np.quantile(drawn.value, 0.98))
 
 
-def _pushed(recording: Recording) -> tuple[FloatArray, BoolArray, float] | None:
-    """Times, whether something other than lift motors draws the current then, and how often."""
+def _pushed(recording: Recording) -> tuple[Series, float] | None:
+    """When something other than lift motors draws the current, and in which share of the time."""
     outputs, current = recording.outputs, recording.current
     if recording.vehicle.kind != "plane" or outputs is None or current is None or not len(current):
         return None
@@ -100,14 +108,12 @@ def _pushed(recording: Recording) -> tuple[FloatArray, BoolArray, float] | None:
             away |= told > float(told[live].min()) + _RUNS_US
     busy = working | ~resting
     share = float(np.mean(away[busy])) if busy.any() else 0.0
-    return time, np.asarray(away), share
+    return Series(time, away.astype(np.float64)), share
 
 
-def _near(time: FloatArray, away: FloatArray) -> BoolArray:
+def _near(time: FloatArray, away: Series) -> BoolArray:
     """Whether each time is within a second of one at which the vehicle was pushed."""
-    if not len(away):
-        return np.zeros(len(time), dtype=bool)
-    after = np.clip(np.searchsorted(away, time), 0, len(away) - 1)
-    before = np.maximum(after - 1, 0)
-    apart = np.minimum(np.abs(away[after] - time), np.abs(away[before] - time))
-    return np.asarray(apart < _MARGIN_S)
+    pushed = np.r_[0, np.cumsum(away.value > 0.0)]
+    first = np.searchsorted(away.time, time - _MARGIN_S, side="right") - 1
+    last = np.searchsorted(away.time, time + _MARGIN_S, side="right")
+    return np.asarray(pushed[last] > pushed[np.maximum(first, 0)])

@@ -18,6 +18,7 @@ from magcomp.model import (
     Readings,
     Recording,
     Series,
+    usual_steps,
 )
 
 PARAMETER_SETTLE_S = 1.5
@@ -29,9 +30,7 @@ ARMED_ENOUGH_S = 30.0
 SHORT_PAUSE_S = 6.0
 """A pause between two armed stretches in which nobody carries a vehicle about: of motor tests."""
 
-
 _LEAST_GAP_S, _GAP_STEPS = 0.5, 2.5
-_NEAR_STEPS = 16
 
 MOST_READINGS = 20_000
 """Half an hour at 10 Hz. More are thinned before a fit: the bound of an hour's flight is that of
@@ -199,17 +198,10 @@ def in_gap(time: FloatArray, known: FloatArray) -> BoolArray:
     if len(known) < 2:
         return np.zeros(len(time), dtype=bool)
     step = np.diff(known)
-    limit = np.maximum(_LEAST_GAP_S, _GAP_STEPS * _usual(step))
+    limit = np.maximum(_LEAST_GAP_S, _GAP_STEPS * usual_steps(step))
     after = np.clip(np.searchsorted(known, time), 1, len(step))
     outside = (time < known[0] - limit[0]) | (time > known[-1] + limit[-1])
     return np.asarray((step[after - 1] > limit[after - 1]) | outside)
-
-
-def _usual(step: FloatArray) -> FloatArray:
-    """Median of the steps near each, same shape: a stream may be asked for more often later on."""
-    near = -(-len(step) // max(1, len(step) // _NEAR_STEPS))
-    padded = np.append(step, np.repeat(step[-1:], -len(step) % near)).reshape(-1, near)
-    return np.repeat(np.median(padded, axis=1), near)[: len(step)]
 
 
 def _usable_state(time: FloatArray, armed: Series | None) -> BoolArray:

@@ -11,7 +11,6 @@ from magcomp import autopilots
 from magcomp.align import (
     currents_of_motors,
     expected_earth,
-    on_lift_alone,
     readings,
     reported,
     thinned,
@@ -24,7 +23,7 @@ from magcomp.analysis.choose import with_speed_controllers
 from magcomp.analysis.compare import Judged, beaten, better
 from magcomp.analysis.emit import Emission, emit, what_applies
 from magcomp.analysis.forms import compared, forms_notes
-from magcomp.analysis.missing import controls_of, no_motors, with_cure
+from magcomp.analysis.missing import controls_of, hover_of, no_motors, with_cure
 from magcomp.analysis.motor_by_motor import Answer, as_written
 from magcomp.analysis.multiplied import kinds_to_try, why_only_to_look_at
 from magcomp.analysis.notes import lacking_notes, notes_of
@@ -128,7 +127,7 @@ def analyse(
     if wanted.regressor == ESC:
         recording = with_speed_controllers(recording)
         wanted = replace(wanted, regressor=CURRENT)
-    recording, left_out = on_lift_alone(recording)
+    recording, left_out = hover_of(recording)
     compasses = _compasses(recording, wanted)
     found = controls_of(recording)
     motors = currents_of_motors(recording)
@@ -236,7 +235,7 @@ def check(recording: Recording, options: Options | None = None) -> Mapping[int, 
         As :func:`analyse`.
     """
     wanted = Options() if options is None else options
-    recording, _ = on_lift_alone(recording)
+    recording, _ = hover_of(recording)
     compasses = _compasses(recording, wanted)
     found = controls_of(recording)
     earth = expected_earth(recording)

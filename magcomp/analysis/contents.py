@@ -8,11 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from magcomp import autopilots
-from magcomp.align import has_position
+from magcomp.align import has_position, on_lift_alone
 from magcomp.align.readings import is_new
+from magcomp.analysis.missing import HOW_TO_HOVER, hovers
 from magcomp.errors import InputError
 from magcomp.fit import LEAST_READINGS
-from magcomp.model import Compass, Recording, Series
+from magcomp.model import CURRENT, THROTTLE, Compass, Recording, Series
 
 SLOW_HZ = 0.8
 """Fewer readings than this of a compass a second leave turns of a minute with too few."""
@@ -188,6 +189,7 @@ def _quantities(recording: Recording) -> Iterator[Quantity]:
         ("gyro", recording.gyro, True),
         ("accelerometer", recording.accel, True),
         ("position", recording.position, True),
+        ("hover or forward flight", recording.forward, True),
     ]
     for name, series, used in others:
         if series is not None:
@@ -230,6 +232,9 @@ def _missing(recording: Recording, found: tuple[CompassContents, ...]) -> Iterat
         yield Missing(what, how["more readings"], prevents=True)
     elif all(compass.rate_hz < SLOW_HZ for compass in found):
         yield Missing("a reading of a compass each second", how["more readings"], prevents=False)
+    hover, left_out = on_lift_alone(recording)
+    if left_out and not hovers(hover):
+        yield Missing("a hover", HOW_TO_HOVER, prevents=True)
     yield from _missing_controls(recording, how)
     if recording.attitude is None or len(recording.attitude) < 2:
         yield Missing("the attitude", how["attitude"], prevents=True)
@@ -240,9 +245,15 @@ def _missing(recording: Recording, found: tuple[CompassContents, ...]) -> Iterat
 
 
 def _missing_controls(recording: Recording, how: Mapping[str, str]) -> Iterator[Missing]:
-    told = [each for each in (recording.current, recording.throttle) if each is not None]
-    if not told:
+    autopilot, kind = autopilots.of(recording), recording.vehicle.kind
+    can = autopilot.multiplied(recording.vehicle)
+    both = {CURRENT: recording.current, THROTTLE: recording.throttle}
+    told = [each for kind, each in both.items() if kind in can and each is not None]
+    if recording.current is None and recording.throttle is None:
         yield Missing("a battery current and a throttle", how["control"], prevents=True)
+    elif not told:
+        what = f"a {' or '.join(can)}, which is all that {autopilot.title} multiplies in a {kind}"
+        yield Missing(what, how["current"], prevents=True)
     elif not any(len(each) > 1 and np.ptp(each.value) > 0.0 for each in told):
         yield Missing(
             "a current or a throttle that changes", "arm, and use the motors", prevents=True

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from magcomp import autopilots
-from magcomp.align import controls
+from magcomp.align import controls, on_lift_alone
 from magcomp.errors import MissingDataError
+from magcomp.fit import LEAST_READINGS
 from magcomp.model import Control, Recording
+
+HOW_TO_HOVER = "hover for two minutes, turning, and climb and descend"
 
 
 def controls_of(recording: Recording) -> tuple[Control, ...]:
@@ -23,6 +26,28 @@ def controls_of(recording: Recording) -> tuple[Control, ...]:
             f"it holds {_silent_controls(recording)}"
         )
     return found
+
+
+def hover_of(recording: Recording) -> tuple[Recording, str]:
+    """What can be fitted of a recording, and in words what was left out.
+
+    Raises
+    ------
+    MissingDataError
+        Where nothing is left.
+    """
+    hover, left_out = on_lift_alone(recording)
+    if left_out and not hovers(hover):
+        raise MissingDataError(
+            f"{recording.source} must hold a hover; instead {left_out.partition(':')[0]}: "
+            f"{HOW_TO_HOVER}"
+        )
+    return hover, left_out
+
+
+def hovers(hover: Recording) -> bool:
+    """Whether what was flown on the lift motors alone is enough for a fit."""
+    return any(len(series) >= LEAST_READINGS for series in hover.field.values())
 
 
 def _silent_controls(recording: Recording) -> str:

@@ -28,6 +28,12 @@ _FARTHEST_M = 0.5
 _WORTH_LOOKING_RAD = np.radians(5.0)
 """Less than this at the largest current is nothing to move wires for."""
 
+_KNOWN = 3.0
+"""A vector is worth a hint from this many of its standard errors on."""
+
+_LEAST_CM = 1.0
+"""No compass is moved by less."""
+
 _STANDS_OUT = 1.3
 _LEVEL, _STEEP = np.radians(30.0), np.radians(60.0)
 _WAYS = (
@@ -111,17 +117,17 @@ def origin_of(vector: FloatArray) -> Origin | None:
 
 
 def hints(fits: Sequence[MotorFit]) -> Iterator[str]:
-    """What a pilot may look for, in words; of the compass that the motors disturb most.
+    """What a pilot may look for, in words; of the compass known to be disturbed most.
 
     Parameters
     ----------
     fits
         One a compass, all against one quantity.
     """
-    of_currents = [fit for fit in fits if not quantity_of(fit.regressor).is_throttle]
-    if not of_currents:
+    known = [fit for fit in fits if not quantity_of(fit.regressor).is_throttle and _is_known(fit)]
+    if not known:
         return
-    fit = max(of_currents, key=lambda each: float(np.linalg.norm(each.interference)))
+    fit = max(known, key=lambda each: float(np.linalg.norm(each.interference)))
     horizontal = horizontal_part(fit.strength, fit.vertical)
     worst = float(np.linalg.norm(fit.interference)) * fit.u_high / horizontal
     found = origin_of(fit.interference)
@@ -134,9 +140,15 @@ def hints(fits: Sequence[MotorFit]) -> Iterator[str]:
         f"leads, 0.5 to 2 cm apart, that runs {found.way_words} {found.height_words}, "
         f"{near:.0f} to {far:.0f} cm away{single if found.single_m < _FARTHEST_M else ''}. Twist "
         f"the battery leads, lead plus and minus together, and put the compass "
-        f"{100.0 * found.halved_m:.0f} cm farther from them: that halves it"
+        f"{max(100.0 * found.halved_m, _LEAST_CM):.0f} cm farther from them: that halves it"
     )
     yield from _of_motors(fit)
+
+
+def _is_known(fit: MotorFit) -> bool:
+    """Whether the vector is more than its own doubt."""
+    doubt = float(np.linalg.norm(fit.interference_std))
+    return float(np.linalg.norm(fit.interference)) > _KNOWN * doubt
 
 
 def _of_motors(fit: MotorFit) -> Iterator[str]:

@@ -28,7 +28,7 @@ from magcomp.errors import ExitCode, UsageError
 from magcomp.fleet.aircraft import aircraft
 from magcomp.fleet.answer import Fleet
 from magcomp.fleet.as_json import fleet_object
-from magcomp.fleet.flights import Flight, select
+from magcomp.fleet.flights import NEEDED, select
 from magcomp.fleet.places import find
 from magcomp.fleet.row import Log, Row, State
 from magcomp.fleet.run import Known, Runner, carry_out_all, known_of, to_do
@@ -196,7 +196,7 @@ def put_together(
     store: Store, logs: tuple[Log, ...], known: Known, since: float, read: int
 ) -> Fleet:
     """The answer for some logs, from the store."""
-    selected = select(store.read(Flight._fields), logs, known, since)
+    selected = select(store.read(NEEDED), logs, known, since)
     return Fleet(aircraft(selected), selected, len(logs), read)
 
 

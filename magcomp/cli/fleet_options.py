@@ -63,7 +63,8 @@ class Workers:
             yield lambda tasks: run(tasks, carry_out, lost, self.limits)
             return
         with cluster.connected(self.scheduler) as client:
-            yield lambda tasks: cluster.run(client, tasks, carry_out, lost)
+            watch = cluster.Watch(complain)
+            yield lambda tasks: cluster.run(client, tasks, carry_out, lost, watch)
 
 
 def worker_options(command: Callable[..., _Result]) -> Callable[..., _Result]:

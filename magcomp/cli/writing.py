@@ -124,7 +124,12 @@ def agreed(count: int, *, yes: bool) -> bool:
 
 
 def carry_out(
-    plan: WritePlan, write: Write, backup: Path, reach: Sequence[str], stop: threading.Event
+    plan: WritePlan,
+    write: Write,
+    backup: Path,
+    reach: tuple[str, ...],
+    stop: threading.Event,
+    status: StatusLine | None = None,
 ) -> ExitCode:
     """Write with progress, and say how it ended.
 
@@ -132,13 +137,15 @@ def carry_out(
     ----------
     reach
         The vehicle's address, and the options by which it was reached.
+    status
+        Where progress is shown; the terminal's own line unless given.
 
     Raises
     ------
     MagcompError
         What ``raise_for_failure`` makes of a bad outcome, other than an interruption.
     """
-    status = StatusLine()
+    status = StatusLine() if status is None else status
     complain(f"Backup:\n  {backup}")
 
     def tell(event: Event) -> None:
@@ -168,7 +175,7 @@ def carry_out(
     return ExitCode.GOOD
 
 
-def complain_of(outcome: Outcome, backup: Path, reach: Sequence[str]) -> None:
+def complain_of(outcome: Outcome, backup: Path, reach: tuple[str, ...]) -> None:
     """Say what stands after an interruption."""
     try:
         raise_for_failure(outcome, backup, *reach)

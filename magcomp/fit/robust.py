@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from magcomp.model import BoolArray, FloatArray, IntArray, median
+from magcomp.model import BoolArray, FloatArray, IntArray, median, usual_steps
 
 ROUNDS = 6
 """σ is re-estimated this often at most."""
@@ -316,7 +316,7 @@ def recorded_time(time: FloatArray) -> FloatArray:
     steps = np.diff(time)
     if not len(steps):
         return np.zeros(len(time))
-    longest = max(_GAP_S, _GAP_STEPS * float(median(steps)))
+    longest = np.maximum(_GAP_S, _GAP_STEPS * usual_steps(steps))
     return np.concatenate([[0.0], np.cumsum(np.minimum(steps, longest))])
 
 

@@ -85,7 +85,9 @@ def aircraft(selected: Selected, limits: Thresholds | None = None) -> tuple[Airc
     groups = defaultdict(lambda: ([], []))
     owner = partial(_owner, boards=_boards([*selected.flights, *selected.unusable]))
     for flight in selected.flights:
-        groups[owner(flight)][0].append(flight)
+        # Asked a hundred thousand times, so what most say is not asked of a function.
+        who = ("board", flight.uid) if flight.uid else owner(flight)
+        groups[who][0].append(flight)
     for flight in selected.unusable:
         # What could not even be read belongs to nobody.
         if flight.autopilot and (flight.uid or flight.device_ids):

@@ -85,7 +85,7 @@ def _urgent(fleet: Fleet, verbose: bool) -> Iterator[RenderableType]:
             yield Padding(Text(words.sentence(words.printable(text))), (0, 1, 0, 3))
     hidden = 0 if verbose else len(needing) - _SHOWN
     if hidden > 0:
-        yield Text(f"\n and {hidden} more: see -v, --html or --csv", style="dim")
+        yield Text(f"\n and {hidden} more: see -v, --html or --table", style="dim")
 
 
 def _all(fleet: Fleet, verbose: bool) -> Iterator[RenderableType]:
@@ -110,7 +110,7 @@ def _all(fleet: Fleet, verbose: bool) -> Iterator[RenderableType]:
     yield table
     hidden = 0 if verbose else len(fleet.aircraft) - _SHOWN
     if hidden > 0:
-        yield Text(f" and {hidden} more: see -v, --html or --csv", style="dim")
+        yield Text(f" and {hidden} more: see -v, --html or --table", style="dim")
 
 
 def _bad(fleet: Fleet, verbose: bool) -> Iterator[RenderableType]:
@@ -127,7 +127,7 @@ def _bad(fleet: Fleet, verbose: bool) -> Iterator[RenderableType]:
         yield Padding(Text(words.sentence(words.printable(each.why)), style="dim"), (0, 1, 0, 3))
     hidden = 0 if verbose else len(fleet.unusable) - _UNUSABLE_SHOWN
     if hidden > 0:
-        yield Text(f" and {hidden} more: see -v, --html or --csv", style="dim")
+        yield Text(f" and {hidden} more: see -v, --html or --table", style="dim")
 
 
 def largest_motor(each: Aircraft) -> str:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import importlib
+import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from itertools import islice
+from queue import Empty, SimpleQueue
 from typing import Any, TypeVar
 
 from magcomp import __version__
@@ -18,6 +20,11 @@ _AHEAD = 2
 """Tasks a thread of the cluster has in hand, so that none waits for the next."""
 
 _CONNECT = "10s"
+
+_PATIENCE_S = 30.0
+"""How long nothing is said of a cluster without a worker: one may be starting again."""
+
+_LOOK_S = 2.0
 
 
 @contextmanager
@@ -78,11 +85,48 @@ def _version() -> str:
     return __version__
 
 
+class Watch:
+    """Says when a cluster has had no worker for a while, and when it has one again.
+
+    Parameters
+    ----------
+    tell
+        Tells people.
+    clock
+        Seconds that only grow.
+    """
+
+    def __init__(
+        self, tell: Callable[[str], None], clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._tell, self._clock = tell, clock
+        self._alone_since: float | None = None
+        self._told = False
+
+    def look(self, workers: int) -> None:
+        """Take note of how many workers there are."""
+        now = self._clock()
+        if workers:
+            if self._told:
+                self._tell("a worker is there again: the run goes on")
+            self._alone_since, self._told = None, False
+            return
+        if self._alone_since is None:
+            self._alone_since = now
+        if not self._told and now - self._alone_since >= _PATIENCE_S:
+            self._told = True
+            self._tell(
+                f"no worker has been there for {_PATIENCE_S:.0f} s: the run waits for one; Ctrl-C "
+                "ends it, and what was done is kept"
+            )
+
+
 def run(
     client: Any,
     tasks: Iterable[_Task],
     work: Callable[[_Task], _Result],
     lost: Callable[[_Task, str], _Result],
+    watch: Watch,
 ) -> Iterator[_Result]:
     """Results as they come; the scheduler is given tasks only as workers are free.
 
@@ -92,29 +136,59 @@ def run(
         From :func:`connected`.
     tasks, work, lost
         As in :func:`magcomp.fleet.local.run`.
+    watch
+        Is told of the workers whenever nothing came for a while.
+
+    Raises
+    ------
+    LinkError
+        Where the scheduler is gone.
     """
     waiting = iter(tasks)
     running: dict[Any, _Task] = {}
-    done = _distributed().as_completed(loop=client.loop)
+    done: SimpleQueue[Any] = SimpleQueue()
 
     def fill() -> None:
-        room = max(_AHEAD * sum(client.nthreads().values()), 1) - len(running)
+        room = max(_AHEAD * sum(_threads(client).values()), 1) - len(running)
         for task in islice(waiting, max(room, 0)):
             future = client.submit(work, task, pure=False)
             running[future] = task
-            done.add(future)
+            future.add_done_callback(done.put)
 
     try:
         fill()
-        for future in done:
+        while running:
+            try:
+                future = done.get(timeout=_LOOK_S)
+            except Empty:
+                watch.look(len(_threads(client)))
+                continue
             task = running.pop(future)
             if future.status == "finished":
                 yield future.result()
             else:
+                # A scheduler that is gone cancels all, and no log is to blame for that.
+                _threads(client)
                 yield lost(task, _why(future))
             fill()
     finally:
-        client.cancel(list(running))
+        # A scheduler that is gone has nothing left to cancel.
+        with suppress(OSError):
+            client.cancel(list(running))
+
+
+def _threads(client: Any) -> dict[str, int]:
+    """Threads of each worker."""
+    try:
+        if client.status in ("closing", "closed"):
+            raise ConnectionError("it does not answer")
+        threads: dict[str, int] = client.nthreads()
+    except OSError as error:
+        raise LinkError(
+            f"The Dask scheduler must go on; instead it is gone ({error}): what was done is kept, "
+            "and the same command goes on from there"
+        ) from error
+    return threads
 
 
 def _why(future: Any) -> str:

@@ -6,6 +6,7 @@ import gc
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import repeat
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,10 +17,26 @@ from magcomp.fleet.store import listed, words_of
 from magcomp.model.recording import BoolArray, FloatArray, IntArray
 
 
+@dataclass(frozen=True, eq=False)
+class Vectors:
+    """What has several numbers, of all rows of a table.
+
+    Attributes
+    ----------
+    correction, in_force, motor_covariance
+        As in :class:`magcomp.fleet.row.Row`, a row each.
+    """
+
+    correction: FloatArray
+    in_force: FloatArray
+    motor_covariance: FloatArray
+
+
 class Flight(NamedTuple):
     """One compass on one flight, or a log without a fit: what an overview needs of a row.
 
-    A tuple, because an overview of many years holds a hundred thousand.
+    A tuple, because an overview of many years holds a hundred thousand; for the same reason its
+    vectors stand with those of all others, in a row of their arrays.
     """
 
     path: str
@@ -45,14 +62,27 @@ class Flight(NamedTuple):
     u_high: float
     strength: float
     vertical: float
-    correction: FloatArray
-    in_force: FloatArray
-    motor_covariance: FloatArray
+    row: int
+    vectors: Vectors
+
+    @property
+    def correction(self) -> FloatArray:
+        """Fitted, shape (12,)."""
+        return np.asarray(self.vectors.correction[self.row])
+
+    @property
+    def in_force(self) -> FloatArray:
+        """What was in force, shape (12,)."""
+        return np.asarray(self.vectors.in_force[self.row])
 
     @property
     def when(self) -> float:
         """Unix time of the flight, as far as known; else of the file."""
         return self.start_unix_s if math.isfinite(self.start_unix_s) else self.modified_s
+
+
+NEEDED = (*(name for name in Flight._fields if name not in ("row", "vectors")), *VECTORS)
+"""What a table must have for :func:`select`."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +110,7 @@ def select(table: Any, logs: Sequence[Log], known: Known, since: float = -math.i
     Parameters
     ----------
     table
-        Of the store, with at least the columns of :class:`Flight`.
+        Of the store, with at least ``NEEDED``.
     logs
         Those asked for.
     known
@@ -99,18 +129,18 @@ def select(table: Any, logs: Sequence[Log], known: Known, since: float = -math.i
         elif digest is not None:
             lost.add(log.path)
     copies = len(logs) - len(wanted) - len(lost)
-    rows = _Rows(table)
+    rows, vectors = _Rows(table), Vectors(**{name: _matrix(table, name) for name in VECTORS})
     asked = rows.of(wanted) & ~(rows.when < since)
     fitted = rows.first_of_each_compass(asked & rows.is_in(State.FITTED))
     others = asked & ~rows.is_in(State.FITTED) & ~rows.is_in(State.COPY)
     unusable: dict[str, Flight] = {}
-    for flight in _flights(table, np.flatnonzero(others)):
+    for flight in _flights(table, vectors, np.flatnonzero(others)):
         unusable.setdefault(flight.digest, flight._replace(path=wanted[flight.digest]))
-    for flight in _flights(table, np.flatnonzero(rows.of({""}) & ~rows.is_in(State.COPY))):
+    for flight in _flights(table, vectors, np.flatnonzero(rows.of({""}) & ~rows.is_in(State.COPY))):
         if flight.path in lost:
             unusable[flight.path] = flight
     return Selected(
-        tuple(_flights(table, rows.in_order(fitted, wanted), wanted)),
+        tuple(_flights(table, vectors, rows.in_order(fitted, wanted), wanted)),
         tuple(sorted(unusable.values(), key=lambda each: each.path)),
         copies,
     )
@@ -151,7 +181,7 @@ class _Rows:
 
 
 def _flights(
-    table: Any, rows: IntArray, paths: Mapping[str, str] | None = None
+    table: Any, vectors: Vectors, rows: IntArray, paths: Mapping[str, str] | None = None
 ) -> Sequence[Flight]:
     """Some rows as flights.
 
@@ -161,25 +191,22 @@ def _flights(
     """
     if not len(rows):
         return []
-    columns = {name: _column(table, name, rows) for name in Flight._fields}
+    columns = {name: listed(table, name, rows) for name in NEEDED if name not in VECTORS}
     if paths is not None:
         columns["path"] = [paths[digest] for digest in columns["digest"]]
     enabled = gc.isenabled()
     gc.disable()
     try:
-        return list(map(Flight._make, zip(*columns.values(), strict=True)))
+        return list(map(Flight, *columns.values(), rows.tolist(), repeat(vectors)))
     finally:
         gc.freeze()
         if enabled:
             gc.enable()
 
 
-def _column(table: Any, name: str, which: IntArray) -> Sequence[Any]:
-    if name not in VECTORS:
-        return listed(table, name, which)
+def _matrix(table: Any, name: str) -> FloatArray:
     flat = table.column(name).combine_chunks().flatten().to_numpy(zero_copy_only=False)
-    rows: Any = np.asarray(flat, dtype=np.float64).reshape(len(table), VECTORS[name])
-    return list(rows[which])
+    return np.asarray(flat, dtype=np.float64).reshape(len(table), VECTORS[name])
 
 
 def by(flights: Sequence[Flight], name: str) -> Mapping[Any, list[Flight]]:

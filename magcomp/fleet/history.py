@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import TypeVar
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from magcomp.fleet.agreeing import Agreement, agreeing, at_once, heading_shift, put_together
 from magcomp.fleet.findings import (
     Attention,
     Finding,
@@ -20,31 +19,14 @@ from magcomp.fleet.findings import (
     why,
 )
 from magcomp.fleet.flights import Flight
-from magcomp.fleet.pooled import (
-    SURE,
-    Change,
-    Pooled,
-    chances_apart,
-    changes,
-    distances,
-    is_definite,
-    pool,
-    pools,
-)
+from magcomp.fleet.matrices import ROWS, is_definite
+from magcomp.fleet.pooled import Change, Pooled, changes
 from magcomp.geometry import horizontal_part
 from magcomp.judge.thresholds import Thresholds
 from magcomp.model import Grade
-from magcomp.model.recording import FloatArray, IntArray
+from magcomp.model.recording import FloatArray
 
-_T = TypeVar("_T")
-
-_COVARIANCE = np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2]])
-_MOTOR = slice(0, 3)
-_MOST_SUSPECTS = 6
-"""Flights looked at closely: which of the many that are somewhat far off is the furthest, tells
-already their distance from the mean of all."""
-
-_TILT = math.sin(math.radians(20.0))
+_COVARIANCE = np.array(ROWS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,26 +73,33 @@ class CompassHistory:
 
 
 Slot = tuple[int, int, Sequence[Flight]]
-"""A compass's slot, the id of what stands in it, and its flights in order of time, at least one."""
+"""A compass's slot, the id of what stands in it, and its flights in order of time, at least one.
+
+All flights of a call are of one table.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class _Compared:
-    """A compass whose flights can be compared."""
+    """A compass whose flights can be compared, and what of them agrees."""
 
     slot: int
     device_id: int
     flights: Sequence[Flight]
     usable: Sequence[int]
-    motors: FloatArray
-    covariances: FloatArray
     at: float
     """Largest control quantity of its flights."""
+    agree: Agreement
+    changed: Change | None = None
 
     @property
-    def shift(self) -> Callable[[FloatArray], FloatArray]:
+    def furthest_deg(self) -> float:
+        """Of its flights from their mean."""
+        return float(self.shift(self.agree.motors - self.agree.pooled.motor).max())
+
+    def shift(self, difference: FloatArray) -> FloatArray:
         """Heading shift there, degrees, of a difference of motor vectors."""
-        return _shift(self.flights[-1], self.at)
+        return heading_shift(difference, self.agree.leverage)
 
 
 def history(
@@ -123,7 +112,7 @@ def history(
     slot, device_id
         Of the compass.
     flights
-        Its flights in order of time, at least one.
+        Its flights in order of time, at least one, of one table.
     limits
         Of the judge.
     """
@@ -134,51 +123,40 @@ def histories(every: Sequence[Slot], limits: Thresholds) -> list[CompassHistory]
     """:func:`history` for many compasses: those with as many flights each are pooled at once."""
     compared = [_compared(*each) for each in every]
     known = [each for each in compared if each is not None]
-    pooled = _at_once(known, lambda some: pools(_motors_of(some), _covariances_of(some)))
-    apart = [
-        float(each.shift(each.motors - mean.motor).max()) > limits.departure_deg / 2
-        for each, mean in zip(known, pooled, strict=True)
-    ]
-    far = [each for each, is_far in zip(known, apart, strict=True) if is_far]
-    changed = iter(
-        _at_once(
-            far,
-            lambda some: changes(_times(some), _motors_of(some), _covariances_of(some)),
-        )
-    )
-    told = iter(
-        _told(each, mean, next(changed) if is_far else None, limits, is_far=is_far)
-        for each, mean, is_far in zip(known, pooled, apart, strict=True)
-    )
+    pooled = put_together([each.agree for each in known])
+    known = [replace(each, agree=mean) for each, mean in zip(known, pooled, strict=True)]
+    told = iter(_told(each, limits) for each in _left_out(known, limits.departure_deg))
     return [
         _untold(*whole, limits) if each is None else next(told)
         for whole, each in zip(every, compared, strict=True)
     ]
 
 
-def _at_once(
-    every: Sequence[_Compared], work: Callable[[Sequence[_Compared]], Sequence[_T]]
-) -> list[_T]:
-    """What work says of each, asked once for all with as many flights."""
-    groups: dict[int, list[int]] = {}
-    for index, each in enumerate(every):
-        groups.setdefault(len(each.usable), []).append(index)
-    found: dict[int, _T] = {}
-    for indices in groups.values():
-        found |= zip(indices, work([every[index] for index in indices]), strict=True)
-    return [found[index] for index in range(len(every))]
+def _left_out(every: Sequence[_Compared], departure_deg: float) -> list[_Compared]:
+    """The same without the flights that what changed since, or the others, speak against."""
+    found = list(every)
+    far = [i for i, each in enumerate(every) if each.furthest_deg > departure_deg / 2]
+    changed = at_once([every[i] for i in far], lambda each: len(each.usable), _changes)
+    stepped = []
+    for i, what in zip(far, changed, strict=True):
+        if what is not None and float(every[i].shift(what.difference)) > departure_deg:
+            since = replace(every[i].agree, among=every[i].agree.among[what.first :])
+            found[i] = replace(every[i], agree=since, changed=what)
+            stepped.append(i)
+    for i, agree in zip(stepped, put_together([found[i].agree for i in stepped]), strict=True):
+        found[i] = replace(found[i], agree=agree)
+    agreed = agreeing([found[i].agree for i in far], departure_deg)
+    for i, agree in zip(far, agreed, strict=True):
+        found[i] = replace(found[i], agree=agree)
+    return found
 
 
-def _motors_of(some: Sequence[_Compared]) -> FloatArray:
-    return np.stack([each.motors for each in some])
-
-
-def _covariances_of(some: Sequence[_Compared]) -> FloatArray:
-    return np.stack([each.covariances for each in some])
-
-
-def _times(some: Sequence[_Compared]) -> FloatArray:
-    return np.array([[each.flights[i].when for i in each.usable] for each in some])
+def _changes(some: Sequence[_Compared]) -> Sequence[Change | None]:
+    return changes(
+        np.array([[each.flights[i].when for i in each.usable] for each in some]),
+        np.stack([each.agree.motors for each in some]),
+        np.stack([each.agree.covariances for each in some]),
+    )
 
 
 def _compared(slot: int, device_id: int, flights: Sequence[Flight]) -> _Compared | None:
@@ -189,13 +167,24 @@ def _compared(slot: int, device_id: int, flights: Sequence[Flight]) -> _Compared
         for i, each in enumerate(flights)
         if each.verdict != Grade.REJECTED and each.regressor == regressor
     ]
-    motors, covariances = _motors(flights, asked), _covariances(flights, asked)
+    if not asked:
+        return None
+    vectors, rows = flights[-1].vectors, [flights[i].row for i in asked]
+    motors = vectors.correction[rows, :3]
+    covariances = vectors.motor_covariance[rows][:, _COVARIANCE]
     sound = np.isfinite(motors).all(1) & is_definite(covariances)
     if not sound.any():
         return None
     usable = [i for i, good in zip(asked, sound.tolist(), strict=True) if good]
     at = max([flights[i].u_high for i in usable])
-    return _Compared(slot, device_id, flights, usable, motors[sound], covariances[sound], at)
+    newest = flights[-1]
+    agree = Agreement(
+        motors[sound],
+        covariances[sound],
+        at / horizontal_part(newest.strength, newest.vertical),
+        np.arange(len(usable)),
+    )
+    return _Compared(slot, device_id, flights, usable, at, agree)
 
 
 def _untold(
@@ -211,34 +200,23 @@ def _untold(
     )
 
 
-def _told(
-    of: _Compared, pooled: Pooled, changed: Change | None, limits: Thresholds, *, is_far: bool
-) -> CompassHistory:
+def _told(of: _Compared, limits: Thresholds) -> CompassHistory:
     flights, usable, slot = of.flights, of.usable, of.slot
-    newest = flights[-1]
+    newest, agreeing, pooled = flights[-1], of.agree.among, of.agree.pooled
     holds = holds_in(newest, limits)
     findings = list(of_newest(slot, newest, holds, limits))
-    at, shift = of.at, of.shift
-    agreeing: IntArray = np.arange(len(usable))
     drift = 0.0
-    apart: list[tuple[int, float]] = []
-    if is_far:
-        if changed is not None and float(shift(changed.difference)) > limits.departure_deg:
-            drift = float(shift(changed.difference))
-            agreeing = agreeing[changed.first :]
-            when = flights[usable[changed.first]].when
-            findings.append(changed_since(slot, changed.kind, when, drift, at, newest.regressor))
-        away = _Away(of.motors, of.covariances, shift, limits.departure_deg, pooled)
-        agreeing, apart = _agree(agreeing, away)
-        if len(agreeing) < len(usable):
-            pooled = pool(of.motors[agreeing], of.covariances[agreeing])
-    scatter_deg = float(shift(np.full(3, pooled.scatter)))
+    if of.changed is not None:
+        drift = float(of.shift(of.changed.difference))
+        when = flights[usable[of.changed.first]].when
+        findings.append(changed_since(slot, of.changed.kind, when, drift, of.at, newest.regressor))
+    scatter_deg = float(of.shift(np.full(3, pooled.scatter)))
     agree = len(agreeing) > 1 and scatter_deg <= limits.departure_deg
     if scatter_deg > limits.departure_deg:
-        findings.append(scattering(slot, len(agreeing), scatter_deg, at, newest.regressor))
+        findings.append(scattering(slot, len(agreeing), scatter_deg, of.at, newest.regressor))
     named = tuple(
-        (usable[k], why(flights[usable[k]], [flights[usable[j]] for j in agreeing], float(deg)))
-        for k, deg in apart
+        (usable[k], why(flights[usable[k]], [flights[usable[j]] for j in agreeing], degrees))
+        for k, degrees in of.agree.apart
     )
     if named:
         count = len(agreeing) + len(named)
@@ -265,74 +243,3 @@ def _told(
         scatter_deg,
         agree,
     )
-
-
-def _motors(flights: Sequence[Flight], which: Sequence[int]) -> FloatArray:
-    return np.array([flights[i].correction for i in which]).reshape(-1, 12)[:, _MOTOR]
-
-
-def _covariances(flights: Sequence[Flight], which: Sequence[int]) -> FloatArray:
-    listed = np.array([flights[i].motor_covariance for i in which]).reshape(-1, 6)
-    return np.asarray(listed[:, _COVARIANCE])
-
-
-@dataclass(frozen=True, eq=False)
-class _Away:
-    """Flights, and how to tell which are away from the others."""
-
-    motors: FloatArray
-    covariances: FloatArray
-    shift: Callable[[FloatArray], FloatArray]
-    departure_deg: float
-    all_together: Pooled
-
-    def suspects(self, among: IntArray) -> IntArray:
-        """Places in ``among`` of what may be far from the others: far from the mean, or heavy."""
-        whole = len(among) == len(self.motors)
-        covariances = self.covariances[among]
-        pooled = self.all_together if whole else pool(self.motors[among], covariances)
-        # Of the others' mean a flight is as far as that, unless it drags the mean along.
-        far = self.shift(self.motors[among] - pooled.motor) > self.departure_deg / 2
-        suspects = np.flatnonzero(far)
-        if not len(suspects):
-            return suspects
-        squared = distances(self.motors[among][suspects], covariances[suspects], pooled)
-        closest = suspects[np.argsort(squared)[-_MOST_SUSPECTS:]]
-        # The heaviest drags the mean along, and then stands near it itself.
-        return np.union1d(closest, np.argmin(np.trace(covariances, axis1=1, axis2=2)))
-
-
-def _agree(among: IntArray, away: _Away) -> tuple[IntArray, list[tuple[int, float]]]:
-    """Leave out the flight that is furthest from the others until all agree.
-
-    Of two that disagree nobody knows which is wrong, so both stay, with a scatter between them.
-    Nor is more than a third left out: then the scatter is the truth.
-    """
-    apart: list[tuple[int, float]] = []
-    spare = len(among) // 3
-    while len(among) > 2 and len(apart) < spare:
-        which = away.suspects(among)
-        if not len(which):
-            break
-        chance, by = chances_apart(away.motors[among], away.covariances[among], which)
-        degrees = away.shift(by)
-        chance = np.where(degrees > away.departure_deg, chance * len(among), 1.0)
-        worst = int(np.argmin(chance))
-        if chance[worst] >= SURE:
-            break
-        apart.append((int(among[which[worst]]), float(degrees[worst])))
-        among = np.delete(among, which[worst])
-    return among, apart
-
-
-def _shift(flight: Flight, at: float) -> Callable[[FloatArray], FloatArray]:
-    """Heading shift in degrees, level or tilted by 20°, of a difference of motor vectors."""
-    horizontal = horizontal_part(flight.strength, flight.vertical)
-
-    def degrees(difference: FloatArray) -> FloatArray:
-        level = np.hypot(difference[..., 0], difference[..., 1])
-        sine = (level + _TILT * np.abs(difference[..., 2])) * at / horizontal
-        # A disturbance as strong as the field itself can point the heading anywhere.
-        return np.where(sine < 1.0, np.degrees(np.arcsin(np.minimum(sine, 1.0))), 180.0)
-
-    return degrees

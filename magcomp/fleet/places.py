@@ -113,6 +113,9 @@ def _at_address(address: str) -> Iterator[Log]:
                 for name, info in system.find(path, detail=True).items()
                 if name.lower().endswith(SUFFIXES)
             }
+            if not found:
+                # What looks for files leaves out what cannot be reached; a list of it does not.
+                system.ls(path, detail=False)
     # Every file system of fsspec has errors of its own.
     except Exception as error:
         raise UsageError(f"{address} must be reachable; instead received: {error}") from error

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy import special
 
-from magcomp.model.recording import BoolArray, FloatArray, IntArray
+from magcomp.fleet import matrices
+from magcomp.model.recording import FloatArray, IntArray
 
 SURE = 1e-3
 """Chance of being wrong below which flights are said to differ."""
@@ -89,10 +90,10 @@ def pools(motors: FloatArray, covariances: FloatArray) -> list[Pooled]:
         Shape (n, k, 3, 3).
     """
     count = motors.shape[1]
-    weights = _inverse(covariances)
+    weights = matrices.inverse(covariances)
     mean, inverse = _mean(motors, weights)
     apart = motors - mean[:, None]
-    q = np.einsum("nki,nki->n", apart, _times(weights, apart))
+    q = np.einsum("nki,nki->n", apart, matrices.times(weights, apart))
     spare = np.einsum("nkii->n", weights) - np.einsum(
         "nij,nkjl,nkli->n", inverse, weights, weights, optimize=True
     )
@@ -101,89 +102,105 @@ def pools(motors: FloatArray, covariances: FloatArray) -> list[Pooled]:
         between = np.maximum((q - 3 * (count - 1)) / spare, 0.0)
         scattered = np.flatnonzero(between > 0.0)
         wide = covariances[scattered] + between[scattered, None, None, None] * np.eye(3)
-        mean[scattered], inverse[scattered] = _mean(motors[scattered], _inverse(wide))
+        mean[scattered], inverse[scattered] = _mean(motors[scattered], matrices.inverse(wide))
     scatter = np.sqrt(between).tolist()
     return [Pooled(*each, count) for each in zip(mean, inverse, scatter, strict=True)]
 
 
 def _mean(motors: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
-    inverse = _inverse(weights.sum(1))
-    return _times(inverse, _times(weights, motors).sum(1)), inverse
+    inverse = matrices.inverse(weights.sum(1))
+    return matrices.times(inverse, matrices.times(weights, motors).sum(1)), inverse
 
 
-def distances(motors: FloatArray, covariances: FloatArray, pooled: Pooled) -> FloatArray:
-    """Squared distance of flights from a mean, in units of what each may be away, shape (k,).
+def distances(motors: FloatArray, covariances: FloatArray, means: Sequence[Pooled]) -> FloatArray:
+    """Squared distance of flights from a mean, in units of what each may be away, shape (n, k).
 
     Parameters
     ----------
     motors, covariances
-        As in :func:`pool`.
-    pooled
-        The mean, and the scatter from flight to flight.
+        As in :func:`pools`.
+    means
+        Of each compass, with the scatter from flight to flight.
     """
-    weights = _inverse(covariances + pooled.scatter**2 * np.eye(3))
-    apart = motors - pooled.motor
-    return np.asarray(np.einsum("ki,ki->k", apart, _times(weights, apart)))
-
-
-def is_definite(matrices: FloatArray) -> BoolArray:
-    """Whether symmetric matrices, shape (k, 3, 3), are finite and positive definite, shape (k,).
-
-    Notes
-    -----
-    Sylvester's criterion: the leading minors are positive. A NaN is not.
-    """
-    a, b, c, d, e, f = _entries(matrices)
-    with np.errstate(over="ignore", invalid="ignore"):
-        minor = a * b - d * d
-        whole = c * minor + e * (d * f - b * e) - f * (a * f - d * e)
-        return np.asarray((a > 0.0) & (minor > 0.0) & (whole > 0.0) & np.isfinite(whole))
+    scatter = np.array([each.scatter for each in means])[:, None, None, None]
+    weights = matrices.inverse(covariances + scatter**2 * np.eye(3))
+    apart = motors - np.stack([each.motor for each in means])[:, None]
+    return np.asarray(np.einsum("nki,nki->nk", apart, matrices.times(weights, apart)))
 
 
 def chances_apart(
     motors: FloatArray, covariances: FloatArray, which: IntArray
 ) -> tuple[FloatArray, FloatArray]:
-    """How unlikely some flights are, each going by all the others.
+    """How unlikely some flights are, each going by all the others of its compass.
 
     Parameters
     ----------
     motors, covariances
-        As in :func:`pool`; at least three flights.
+        As in :func:`pools`; at least three flights a compass.
     which
-        Indices of the flights asked for, shape (n,).
+        Indices of the flights asked for, shape (n, m).
 
     Returns
     -------
     chance
-        Of being as far from the others' mean, shape (n,).
+        Of being as far from the others' mean, shape (n, m).
     apart
-        Difference from the others' mean, mGauss per unit, shape (n, 3).
+        Difference from the others' mean, mGauss per unit, shape (n, m, 3).
 
     Notes
     -----
     For all of them at once: sums over the others are the whole sums less one term.
     """
-    count = len(motors)
-    weights = _inverse(covariances)
+    count = motors.shape[1]
+    weights = matrices.inverse(covariances)
     sums = _Sums(weights, motors)
     others = _Sums(
-        *(whole - each[which] for whole, each in zip(sums.whole, sums.terms, strict=True))
+        *(
+            whole[:, None] - _chosen(each, which)
+            for whole, each in zip(sums.whole, sums.terms, strict=True)
+        )
     )
     squares = weights @ weights
-    inverse = _inverse(others.weight)
-    spare = np.trace(others.weight, axis1=1, axis2=2) - np.trace(
-        inverse @ (squares.sum(0) - squares[which]), axis1=1, axis2=2
+    inverse = matrices.inverse(others.weight)
+    spare = np.einsum("nmii->nm", others.weight) - np.einsum(
+        "nmij,nmji->nm", inverse, squares.sum(1)[:, None] - _chosen(squares, which)
     )
     excess = others.left(inverse) - 3 * (count - 2)
-    between = np.maximum(np.divide(excess, spare, where=spare > 0, out=np.zeros(len(which))), 0.0)
-    again = _inverse(covariances + between[:, None, None, None] * np.eye(3))
-    again[np.arange(len(which)), which] = 0.0
-    spread = _inverse(again.sum(1))
-    weighted = np.einsum("nkij,kj->ni", again, motors)
-    apart = motors[which] - _times(spread, weighted)
-    spread = spread + covariances[which] + between[:, None, None] * np.eye(3)
-    distance = np.einsum("ki,ki->k", apart, _times(_inverse(spread), apart))
+    between = np.maximum(np.divide(excess, spare, where=spare > 0, out=np.zeros(which.shape)), 0.0)
+    weight, vector = _sums_of_the_others(motors, covariances, which, between)
+    spread = matrices.inverse(weight)
+    apart = _chosen(motors, which) - matrices.times(spread, vector)
+    wide = spread + _chosen(covariances, which) + between[..., None, None] * np.eye(3)
+    distance = np.einsum("nmi,nmi->nm", apart, matrices.times(matrices.inverse(wide), apart))
     return np.asarray(special.chdtrc(3, distance)), apart
+
+
+def _chosen(each: FloatArray, which: IntArray) -> FloatArray:
+    """Of what each flight has, shape (n, k, …), what some have, shape (n, m, …)."""
+    return np.asarray(each[np.arange(len(which))[:, None], which])
+
+
+def _sums_of_the_others(
+    motors: FloatArray, covariances: FloatArray, which: IntArray, between: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Sums of W and W·m over the flights but one, with a scatter that is that one's own.
+
+    Nine in ten of what a fleet's flights are compared for, so without a matrix a flight.
+    """
+    xx, yy, zz, xy, xz, yz = (each[:, None] for each in matrices.entries(covariances))
+    xx, yy, zz = (each + between[..., None] for each in (xx, yy, zz))
+    cofactors, determinant = matrices.cofactors(xx, yy, zz, xy, xz, yz)
+    share = 1.0 / determinant
+    np.put_along_axis(share, which[..., None], 0.0, axis=2)
+    parts = [each * share for each in cofactors]
+    weight = matrices.symmetric([each.sum(2) for each in parts])
+    vector = np.empty(weight.shape[:-1])
+    for row, places in enumerate(matrices.ROWS):
+        vector[..., row] = sum(
+            np.einsum("nmk,nk->nm", parts[place], motors[..., axis])
+            for axis, place in enumerate(places)
+        )
+    return weight, vector
 
 
 def change(times: FloatArray, motors: FloatArray, covariances: FloatArray) -> Change | None:
@@ -220,7 +237,7 @@ def changes(times: FloatArray, motors: FloatArray, covariances: FloatArray) -> l
         return [None] * number
     # With the scatter from flight to flight in the weights, so that no flight counts for all.
     scatter = _scatter(motors, covariances)
-    weights = _inverse(covariances + scatter[:, None, None, None] * np.eye(3))
+    weights = matrices.inverse(covariances + scatter[:, None, None, None] * np.eye(3))
     sums = _Sums(weights, motors)
     whole = _Sums(*sums.whole).left()
     found: list[list[tuple[float, Change]]] = [[] for _ in range(number)]
@@ -263,29 +280,6 @@ def _scatter(motors: FloatArray, covariances: FloatArray) -> FloatArray:
     return np.asarray(np.maximum(total / of, 0.0) / 6)
 
 
-def _inverse(matrices: FloatArray) -> FloatArray:
-    """Of symmetric matrices, shape (..., 3, 3), by their cofactors: a tenth of LAPACK's time."""
-    a, b, c, d, e, f = _entries(matrices)
-    first, second, third = b * c - f * f, e * f - d * c, d * f - e * b
-    determinant = a * first + d * second + e * third
-    inverse = np.empty_like(matrices, dtype=np.float64)
-    inverse[..., 0, 0], inverse[..., 1, 1], inverse[..., 2, 2] = first, a * c - e * e, a * b - d * d
-    inverse[..., 0, 1] = inverse[..., 1, 0] = second
-    inverse[..., 0, 2] = inverse[..., 2, 0] = third
-    inverse[..., 1, 2] = inverse[..., 2, 1] = d * e - a * f
-    return np.asarray(inverse / determinant[..., None, None])
-
-
-def _entries(matrices: FloatArray) -> tuple[FloatArray, ...]:
-    """xx, yy, zz, xy, xz and yz of symmetric matrices, shape (...) each."""
-    places = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
-    return tuple(matrices[..., i, j] for i, j in places)
-
-
-def _times(matrices: FloatArray, vectors: FloatArray) -> FloatArray:
-    return np.asarray((matrices @ vectors[..., None])[..., 0])
-
-
 class _Sums:
     """Sums of W, W·m and mᵀ·W·m over some flights; any number of such sums at once.
 
@@ -297,7 +291,7 @@ class _Sums:
     ) -> None:
         self.weight = weight
         if square is None:
-            turned = _times(weight, vector)
+            turned = matrices.times(weight, vector)
             square = np.einsum("...i,...i->...", vector, turned)
             vector = turned
         self.vector, self.square = vector, square
@@ -317,8 +311,8 @@ class _Sums:
 
     def left(self, inverse: FloatArray | None = None) -> FloatArray:
         """Weighted squared distance of the flights from their mean."""
-        turned = _inverse(self.weight) if inverse is None else inverse
-        explained = np.einsum("...i,...i->...", self.vector, _times(turned, self.vector))
+        turned = matrices.inverse(self.weight) if inverse is None else inverse
+        explained = np.einsum("...i,...i->...", self.vector, matrices.times(turned, self.vector))
         return np.asarray(np.maximum(self.square - explained, 0.0))
 
 
@@ -338,10 +332,10 @@ def _lines(
     design = np.stack([np.ones_like(share), share], axis=2)
     powers = design[:, :, :, None] * design[:, :, None, :]
     normal = np.einsum("nkab,nkij->naibj", powers, weights).reshape(-1, 6, 6)
-    right = np.einsum("nka,nki->nai", design, _times(weights, motors)).reshape(-1, 6, 1)
+    right = np.einsum("nka,nki->nai", design, matrices.times(weights, motors)).reshape(-1, 6, 1)
     line = np.linalg.solve(normal, right).reshape(-1, 2, 3)
     apart = motors - design @ line
-    left = np.einsum("nki,nki->n", apart, _times(weights, apart))
+    left = np.einsum("nki,nki->n", apart, matrices.times(weights, apart))
     for n, least, (_, slope) in zip(which.tolist(), left.tolist(), line, strict=True):
         yield n, least, slope
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from magcomp.fleet.row import Log, Row, State, without_fit
-from magcomp.fleet.store import Store, listed
+from magcomp.fleet.store import Store, listed, words_of
 from magcomp.fleet.task import Outcome, Task
 
 _ROWS_A_FILE = 200
@@ -38,9 +40,12 @@ class Known:
 def known_of(store: Store) -> Known:
     """Look through the store."""
     names = ["path", "size", "stamp", "digest", "state"]
-    # A log has a row a compass, and they say the same of it.
-    table = store.read(names).group_by(names, use_threads=False).aggregate([])
-    columns = [listed(table, name) for name in names]
+    table = store.read(names)
+    # A log has a row a compass, one after the other, and they say the same of it.
+    coded = [words_of(table, name)[1] for name in names if name != "size"]
+    different = np.ones(len(table), dtype=bool)
+    different[1:] = np.any(np.diff([*coded, table.column("size").to_numpy()], axis=1), axis=0)
+    columns = [listed(table, name, np.flatnonzero(different)) for name in names]
     gone = str(State.LOST)  # a member of an enumeration is compared by a function of its own
     digests: dict[tuple[str, int, str], str] = {}
     by_size: dict[int, set[str]] = {}

@@ -173,9 +173,9 @@ def wait_disarmed(
                     f"The vehicle must say whether it is armed; instead no heartbeat came in "
                     f"{seconds:.0f} s"
                 )
+            still = f"still armed after {seconds:.0f} s" if seconds else "armed"
             raise VehicleRefusedError(
-                "The vehicle must be disarmed to be written; instead it is still armed after "
-                f"{seconds:.0f} s"
+                f"The vehicle must be disarmed to be written; instead it is {still}"
             )
         if state and not told:
             tell(f"The vehicle is armed: land and disarm it within {seconds:.0f} s to write")

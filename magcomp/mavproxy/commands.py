@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import shlex
 import threading
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from magcomp.analysis import parameter_set
+from magcomp.cli.linking import StatusLine
 from magcomp.cli.options import check_output
 from magcomp.cli.output import answer_words, complain, look
 from magcomp.cli.writing import carry_out, show_difference
 from magcomp.errors import ExitCode, MagcompError, UsageError, unforeseen
+from magcomp.live.guide import STEADY
 from magcomp.live.session import LiveSession
+from magcomp.live.snapshot import LiveSnapshot
 from magcomp.live.upload import new_file
 from magcomp.model import Analysis, Grade
 from magcomp.report import as_text, words
@@ -43,6 +47,7 @@ class Commands:
     def __init__(self, session: LiveSession) -> None:
         self._session = session
         self._analysis: Analysis | None = None
+        self._fitted_s = 0.0
         self._backup: Path | None = None
         self._stop = threading.Event()
         self._at_work: threading.Thread | None = None
@@ -75,11 +80,13 @@ class Commands:
             self._at_work.join(seconds)
         return self._at_work is None or not self._at_work.is_alive()
 
-    def close(self) -> None:
-        """End what is at work, a write by putting everything back, and close the session."""
+    def stop(self) -> bool:
+        """Have what is at work end, a write by putting everything back; whether all has ended."""
         self._stop.set()
-        if self._at_work is not None:
-            self._at_work.join()
+        return self.wait(0.0)
+
+    def close(self) -> None:
+        """Close the session, once all has ended."""
         self._session.close()
 
     def _guarded(self, work: Callable[[Sequence[str]], None], rest: Sequence[str]) -> None:
@@ -94,24 +101,39 @@ class Commands:
         shown = self._session.snapshot()
         who = "no vehicle yet" if shown.vehicle is None else words.vehicle(shown.vehicle)
         ready = "; its calibration is read" if shown.ready else ""
+        path = shown.recording_path
+        into = "" if path is None else f" into {words.printable(str(path))}"
         lines = [
             f"{who}; {shown.link_text}{ready}",
-            f"{words.duration(shown.recorded_s)} are recorded",
+            f"{words.duration(shown.recorded_s)} are recorded{into}",
+            *shown.warnings,
+            self._next(shown),
         ]
-        if shown.recording_path is not None:
-            lines.append(f"into {words.printable(str(shown.recording_path))}")
-        lines += [*shown.warnings, shown.guidance.text]
-        if self._analysis is not None:
-            lines.append(f"The last fit is {self._analysis.grade.value}")
         answer_words("".join(f"{words.sentence(line)}\n" for line in lines if line))
+
+    def _next(self, shown: LiveSnapshot) -> str:
+        """What to do next. Nothing is fitted here unasked, so that the guide misses an answer."""
+        guidance = shown.guidance
+        if shown.armed and guidance.missing == (STEADY,):
+            return "all that a fit needs is flown: land, then magcomp fit"
+        if shown.armed is not False or not shown.armed_until_s:
+            return guidance.text
+        if self._analysis is None or self._fitted_s < shown.armed_until_s:
+            return "magcomp fit says whether what was recorded is enough"
+        grade = self._analysis.grade
+        rejected = grade is Grade.REJECTED
+        then = "fly once more" if rejected else "magcomp write shows what would change"
+        return f"the last fit is {grade.value}: {then}"
 
     def _fit(self, rest: Sequence[str]) -> None:
         output = Path(rest[0]).expanduser() if rest else None
         if output is not None:
             check_output(output, SUFFIXES, output, force=False)
         complain("Fitting what was recorded")
+        recorded_s = self._session.snapshot().recorded_s
         recording = self._session.recording()
         self._analysis = analysis = self._session.analyse()
+        self._fitted_s = recorded_s
         chosen = parameter_set(analysis)
         present = recording.parameters.latest
         answer_words(as_text.analysis_text(analysis, chosen.values, present, look(), advise=False))
@@ -145,7 +167,8 @@ class Commands:
         ) -> Outcome:
             return self._session.restore(backup, plan, path, tell, stop)
 
-        self._carry_out(plan, "undo", _YES in rest, restore)
+        word = shlex.join(["undo", *named[:1]])
+        self._carry_out(plan, word, _YES in rest, restore)
 
     def _carry_out(self, plan: WritePlan, word: str, agreed: bool, write: Write) -> None:
         """Show the difference, and where that was agreed to, write it and prove it."""
@@ -162,8 +185,11 @@ class Commands:
             plan,
             lambda tell, stopped: write(plan, backup, tell, stopped),
             backup,
-            str(self._session.connection.address),
+            # There is one vehicle here: what brings it back needs no address, but consent.
+            (_YES,),
             self._stop,
+            # A line that is drawn anew again and again would be drawn over the prompt.
+            StatusLine(terminal=False),
         )
         if code is ExitCode.GOOD:
             self._backup = backup

@@ -52,6 +52,7 @@ def load(mpstate: Any) -> Any:
             super().__init__(mpstate, "magcomp", "what the motors do to the compass, and the cure")
             words = ["status", "fit", "write (yes)", "undo (yes)"]
             self.add_command("magcomp", self.said, "compass motor compensation", words)
+            self._leaving = False
 
         def mavlink_packet(self, packet: Any) -> None:
             """Called by MAVProxy for each message."""
@@ -64,8 +65,20 @@ def load(mpstate: Any) -> Any:
 
         def unload(self) -> None:
             """Called by MAVProxy before it forgets the module."""
-            commands.close()
             mpstate.command_map.pop("magcomp", None)
+            if commands.stop():
+                commands.close()
+                return
+            # MAVProxy waits for this and hears nothing meanwhile, but a write is put back by
+            # hearing the vehicle: so stay on its list until that has ended.
+            self._leaving = True
+            self.needs_unloading = False
+            mpstate.modules.append((self, None))
+
+        def idle_task(self) -> None:
+            """Called by MAVProxy again and again."""
+            if self._leaving and commands.stop():
+                self.needs_unloading = True
 
     return MagcompModule()
 

@@ -23,7 +23,7 @@ from magcomp.model.fit import (
     unpack,
 )
 from magcomp.model.forms import AsWritten, Form
-from magcomp.model.numbers import as_floats, median
+from magcomp.model.numbers import as_floats, median, usual_steps
 from magcomp.model.parameters import ParameterSet
 from magcomp.model.quantity import (
     CURRENT,
@@ -115,4 +115,5 @@ __all__ = [
     "symmetric",
     "unit_of",
     "unpack",
+    "usual_steps",
 ]

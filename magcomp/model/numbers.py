@@ -1,4 +1,4 @@
-"""Numbers as they stand in a file or a frame, made into numbers to reckon with; their median."""
+"""Numbers of a file or a frame made into numbers to reckon with; their median, and usual steps."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+_NEAR_STEPS = 16
 
 
 def as_floats(values: NDArray[Any]) -> NDArray[np.float64]:
@@ -40,3 +42,22 @@ def median(values: NDArray[np.float64]) -> NDArray[np.float64]:
     count = len(values)
     middle = (ordered[..., (count - 1) // 2] + ordered[..., count // 2]) / 2.0
     return np.asarray(np.where(np.isnan(ordered[..., -1]), np.nan, middle))
+
+
+def usual_steps(step: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Median of the steps near each, shape (n,): a stream may be asked for more often later on.
+
+    Parameters
+    ----------
+    step
+        From each moment to the next, shape (n,).
+
+    Examples
+    --------
+    >>> seldom_then_often = np.r_[np.full(32, 1.0), np.full(320, 0.1)]
+    >>> usual_steps(seldom_then_often)[[0, 20, 100]].tolist()
+    [1.0, 1.0, 0.1]
+    """
+    near = -(-len(step) // max(1, len(step) // _NEAR_STEPS))
+    padded = np.append(step, np.repeat(step[-1:], -len(step) % near)).reshape(-1, near)
+    return np.repeat(median(padded.T), near)[: len(step)]

@@ -146,7 +146,7 @@ def decode_vehicle(
     tables = {message: decode(octets, frames[rows[message]], message) for message in rows}
     let_go(octets)
     stamp = _stamps(len(frames), rows, tables)
-    copies = repeated(frames, stamp)
+    copies = repeated(frames, stamp, rows)
     if copies.any():
         tables = {message: tables[message][~copies[rows[message]]] for message in rows}
         frames, stamp = frames[~copies], stamp[~copies]
@@ -210,6 +210,7 @@ def _recording(decoded: Decoded, source: str, kind: str) -> Recording:
         other_currents=quantities.other_currents(messages),
         esc_currents=quantities.esc_currents(messages),
         raw_compasses=raw,
+        forward=quantities.forward(messages),
     )
 
 

@@ -30,6 +30,8 @@ _CONTROLLERS = (
 )
 _FULL_THROTTLE = 100
 _FIX_3D = 3
+_NEITHER, _HOVERS = 0, 3
+"""EXTENDED_SYS_STATE.vtol_state of a vehicle that has no two phases, and of one that hovers."""
 
 _SIMULATION_PREFIX = "SIM_"
 
@@ -133,6 +135,20 @@ def armed(table: Table) -> FloatArray:
     return np.asarray(state[table["base_mode"]])
 
 
+def forward(messages: Messages) -> Series | None:
+    """1 where a VTOL flies on its wings or is in transition; None of any other vehicle.
+
+    It is told about once a second: a row whose next one differs counts as on the way already.
+    """
+    if Message.EXTENDED_SYS_STATE not in messages:
+        return None
+    time, table = messages[Message.EXTENDED_SYS_STATE]
+    rows = table["vtol_state"] != _NEITHER
+    away = table["vtol_state"][rows] != _HOVERS
+    away[:-1] |= away[1:]
+    return Series(time[rows], away.astype(np.float64)) if rows.any() else None
+
+
 def voltage(messages: Messages) -> Series | None:
     """Volts of the first battery from millivolts."""
     return _fuller(_cell_sum(messages), _system_status(messages, "voltage_battery"))
@@ -204,16 +220,22 @@ def parameters(messages: Messages, autopilot: str, simulation: bool) -> list[Par
     if Message.PARAM_VALUE not in messages:
         return []
     time, table = messages[Message.PARAM_VALUE]
+    simulated = _begin_with(table["param_id"], _SIMULATION_PREFIX)
+    rows = simulated if simulation else ~simulated
+    if not rows.all():
+        time, table = time[rows], table[rows]
     how = encoding(autopilot, capabilities(messages))
     value = decode_values(table["param_value"], table["param_type"], how)
-    names = text(table["param_id"])
-    rows = zip(time.tolist(), names, value.tolist(), strict=True)
+    each = zip(time.tolist(), text(table["param_id"]), value.tolist(), strict=True)
     # Nothing here is a Python call for each of a log's thousand parameters.
-    changes = map(tuple.__new__, repeat(ParameterChange), rows)
-    simulated = {name for name in set(names) if name.startswith(_SIMULATION_PREFIX)}
-    if not simulated and not simulation:
-        return list(changes)
-    return [change for change in changes if (change[1] in simulated) is simulation]
+    return list(map(tuple.__new__, repeat(ParameterChange), each))
+
+
+def _begin_with(names: NDArray[np.bytes_], prefix: str) -> NDArray[np.bool_]:
+    """Which of some names of a fixed width begin so, shape (n,)."""
+    wanted = np.frombuffer(prefix.encode("ascii"), np.uint8)
+    letters = np.ascontiguousarray(names).view(np.uint8).reshape(len(names), -1)
+    return np.asarray((letters[:, : len(wanted)] == wanted).all(axis=1))
 
 
 def holds_whole_list(messages: Messages) -> bool:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,7 +15,7 @@ from magcomp.sources.clock import NO_STAMP
 _MIX = np.int64(0x1E3779B97F4A7C15)
 
 
-def repeated(frames: Frames, stamp: OffsetArray) -> MaskArray:
+def repeated(frames: Frames, stamp: OffsetArray, rows: Mapping[int, NDArray[np.intp]]) -> MaskArray:
     """Which frames of one vehicle are copies of an earlier one, shape (n,).
 
     Same message, sequence number and checksum, and either the same time of the vehicle or the
@@ -27,6 +29,8 @@ def repeated(frames: Frames, stamp: OffsetArray) -> MaskArray:
         In the order of the stream, shape (n,).
     stamp
         The vehicle's time as sent, or ``NO_STAMP``, shape (n,).
+    rows
+        Which frames carry each message, increasing.
     """
     content = (
         (frames.message.astype(np.int64) << 24)
@@ -34,7 +38,15 @@ def repeated(frames: Frames, stamp: OffsetArray) -> MaskArray:
         | frames.checksum
     )
     stamped = stamp != NO_STAMP
-    copies = _seen_before(np.where(stamped, stamp, frames.arrival), content)
+    key = np.where(stamped, stamp, frames.arrival)
+    # A message whose time only ever goes on stands nowhere twice, and that is soon seen.
+    doubtful = [each for each in rows.values() if not _goes_on(key[each])]
+    if 2 * sum(map(len, doubtful)) > len(frames):
+        copies = _seen_before(key, content)
+    else:
+        copies = np.zeros(len(frames), dtype=bool)
+        among = np.sort(np.concatenate([np.zeros(0, np.intp), *doubtful]))
+        copies[among] = _seen_before(key[among], content[among])
     copied = copies & stamped
     if copied.any():
         anchors = np.flatnonzero(stamped)
@@ -44,6 +56,10 @@ def repeated(frames: Frames, stamp: OffsetArray) -> MaskArray:
         beside |= copied[anchors[np.maximum(after - 1, 0)]] & (after > 0)
         copies[bare] |= beside & _seen_before(content[bare], content[bare])
     return copies
+
+
+def _goes_on(time: OffsetArray) -> bool:
+    return bool((time[1:] > time[:-1]).all())
 
 
 def _sharing(mixture: OffsetArray) -> NDArray[np.intp]:

@@ -11,6 +11,8 @@ from unequal import Unequal
 
 from magcomp.align.phases import on_lift_alone
 from magcomp.analysis.analyse import Options, analyse, check
+from magcomp.analysis.contents import contents
+from magcomp.errors import MissingDataError
 from magcomp.model import ParameterChange, ParameterHistory, Series
 from magcomp.report import as_json, as_text
 from magcomp.report.look import Look
@@ -72,6 +74,24 @@ def test_a_firmware_that_says_when_it_flies_forward_is_believed():
     assert on_lift_alone(never) == (never, "")
 
 
+def test_forward_flight_is_left_out_of_what_only_throttle_tells():
+    told = Series(np.array([0.0, FROM, UNTIL]), np.array([0.0, 1.0, 0.0]))
+    made = replace(quadplane(functions={}), forward=told)
+    by_current, _ = on_lift_alone(made)
+    hover, words = on_lift_alone(replace(made, current=None, throttle=made.current))
+    assert words.startswith("the vehicle flies forward in 3")
+    assert np.array_equal(hover.field[1].time, by_current.field[1].time)
+    assert np.array_equal(hover.throttle.time, by_current.current.time)
+
+
+def test_a_pusher_that_runs_in_what_is_said_to_be_a_hover_is_left_out_too():
+    told = Series(np.array([0.0, 20.0, 40.0]), np.array([0.0, 1.0, 0.0]))
+    hover, words = on_lift_alone(replace(quadplane(), forward=told))
+    assert words.startswith("the vehicle flies forward")
+    for begin, end in ((20.0, 40.0), (FROM, UNTIL)):
+        assert not np.any((hover.field[1].time > begin) & (hover.field[1].time < end))
+
+
 def test_a_check_says_that_forward_flight_is_left_out():
     recording = quadplane()
     verdicts = check(recording)
@@ -108,5 +128,17 @@ def test_what_has_no_two_phases_stays_as_it_is(recording):
 
 def test_the_hovers_vector_is_found_beside_forward_flight():
     found = analyse(quadplane(), Options(regressor="current"))
-    assert np.linalg.norm(found.compasses[0].fit.interference - INTERFERENCE) < 0.15
+    (compass,) = found.compasses
+    assert np.linalg.norm(compass.fit.interference - INTERFERENCE) < 0.15
+    assert not any("drops out" in reason for reason in compass.verdict.reasons)
     assert any("a pusher drives the vehicle" in note for note in found.notes)
+
+
+@pytest.mark.parametrize("look", [analyse, check])
+def test_a_flight_without_a_hover_says_so(look):
+    never = Series(np.array([0.0]), np.array([1.0]))
+    recording = replace(quadplane(), forward=never)
+    with pytest.raises(MissingDataError, match=r"must hold a hover; .* flies forward in 100 %"):
+        look(recording)
+    (missing,) = (each for each in contents(recording).missing if each.prevents)
+    assert missing.what == "a hover"

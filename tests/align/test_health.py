@@ -92,6 +92,13 @@ def test_dropouts_of_a_few_readings_show_on_a_slow_link_too(sound):
     assert "drops out" in complaint
 
 
+def test_a_compass_that_is_told_more_often_later_on_did_not_drop_out_before(sound):
+    field = sound.field[1]
+    number = np.arange(len(field))
+    told = (number % 20 == 0) | (field.time > 0.6 * field.time[-1])
+    assert compass_complaints(with_field(sound, field.value, told), 1) == ()
+
+
 def test_strong_soft_iron_on_a_slow_link_is_no_glitch(sound):
     """Each reading of a turn then differs much from the one before."""
     field = sound.field[1]

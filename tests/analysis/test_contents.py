@@ -71,6 +71,16 @@ def test_what_prevents_a_fit_is_named_and_does_prevent_it(flown: Recording, lack
         analyse(recording)
 
 
+def test_a_throttle_that_the_firmware_does_not_multiply_is_none(flown: Recording) -> None:
+    plane = of_kind(replace(flown, current=None, throttle=flown.current), "plane")
+    found = contents(plane)
+    (missing,) = (each for each in found.missing if each.prevents)
+    assert missing.what.startswith("a current, which is all that ArduPilot multiplies in a plane")
+    assert "BATT_MONITOR" in missing.how
+    with pytest.raises(MissingDataError, match="all that ArduPilot multiplies in a plane"):
+        analyse(plane)
+
+
 def test_what_only_weakens_a_fit_does_not_prevent_it(swept: Recording) -> None:
     recording = replace(swept, position=None, parameters=ParameterHistory())
     found = contents(recording)

@@ -91,3 +91,16 @@ def test_a_hint_is_marked_as_one_and_little_is_worth_none():
     assert "Twist the battery leads" in said
     little = replace(fitted(), correction=replace(fitted().correction, motor=np.full(3, 0.01)))
     assert not list(hints([little]))
+
+
+def test_a_vector_that_is_not_known_is_no_hint():
+    fit = fitted()
+    doubtful = replace(fit, covariance=fit.covariance * 1e6)
+    assert not list(hints([doubtful]))
+    (said, *_) = hints([doubtful, replace(fit, compass=2)])
+    assert "compass 2" in said
+
+
+def test_a_compass_is_moved_by_a_centimetre_at_least():
+    near = replace(fitted(), correction=replace(fitted().correction, motor=np.full(3, 400.0)))
+    assert "put the compass 1 cm farther" in " ".join(hints([near]))

@@ -29,6 +29,11 @@ def test_slow_telemetry_is_no_row_of_gaps() -> None:
     assert np.allclose(recorded_time(time), time)
 
 
+def test_telemetry_that_comes_more_often_later_on_was_no_row_of_gaps_before() -> None:
+    time = np.concatenate([np.arange(100) * 3.0, 300.0 + np.arange(3000) * 0.1])
+    assert np.allclose(recorded_time(time), time)
+
+
 @given(st.lists(st.floats(0.0, 1e9), min_size=1, max_size=60))
 def test_blocks_ascend_and_begin_at_zero(moments: list[float]) -> None:
     block = time_blocks(np.sort(np.array(moments)), 5.0)

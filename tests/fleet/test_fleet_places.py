@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 import threading
 from collections.abc import Iterator
 from functools import partial
@@ -55,8 +56,21 @@ def test_a_web_server_is_a_place(server: str, tmp_path: Path) -> None:
 
 
 def test_a_log_that_a_server_lacks_is_refused(server: str) -> None:
-    with pytest.raises(UsageError, match=r"must (be reachable|hold logs)"):
+    with pytest.raises(UsageError, match="must be reachable"):
         find([f"{server}/nowhere/"])
+
+
+def test_a_server_that_is_not_there_is_not_called_empty() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as nobody:
+        port = nobody.getsockname()[1]
+    with pytest.raises(UsageError, match=r"must be reachable; instead received: .*connect"):
+        find([f"http://127.0.0.1:{port}/"])
+
+
+def test_a_server_without_logs_is_said_to_have_none(server: str, tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(UsageError, match="must hold logs; instead there is none"):
+        find([f"{server}/empty/"])
 
 
 def test_an_object_store_is_a_place() -> None:

@@ -8,13 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import special
 
+from magcomp.fleet.matrices import is_definite
 from magcomp.fleet.pooled import (
     SURE,
     chances_apart,
     change,
     changes,
     distances,
-    is_definite,
     pool,
     pools,
 )
@@ -58,7 +58,7 @@ def test_one_flight_is_its_own_mean() -> None:
 def test_all_flights_at_once_as_one_after_the_other(count: int) -> None:
     motors, covariances = flights(np.random.default_rng(count), count, 0.2)
     which = np.arange(count)[::2]
-    chances, aparts = chances_apart(motors, covariances, which)
+    (chances,), (aparts,) = chances_apart(motors[None], covariances[None], which[None])
     for index, chance, apart in zip(which, chances, aparts, strict=True):
         others = np.arange(count) != index
         rest = pool(motors[others], covariances[others])
@@ -112,10 +112,11 @@ def test_who_is_furthest_is_found_among_the_few_that_are_looked_at(
     motors, covariances = flights(rng, count)
     motors[count // 2] += far
     pooled = pool(motors, covariances)
-    chances, _ = chances_apart(motors, covariances, np.arange(count))
+    (chances,), _ = chances_apart(motors[None], covariances[None], np.arange(count)[None])
     worst = int(np.argmin(chances))
     if chances[worst] < SURE / count:
-        looked_at = np.argsort(distances(motors, covariances, pooled))[-6:]
+        (squared,) = distances(motors[None], covariances[None], [pooled])
+        looked_at = np.argsort(squared)[-6:]
         heaviest = np.argmin(np.trace(covariances, axis1=1, axis2=2))
         assert worst in looked_at or worst == heaviest
 

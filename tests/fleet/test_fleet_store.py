@@ -14,6 +14,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from made_flights import log, row
+from pyarrow import parquet
 
 from magcomp.errors import OutputError
 from magcomp.fleet.as_table import cell, csv_text, write_table
@@ -131,6 +132,25 @@ def test_no_cell_is_a_formula(text: str) -> None:
     written = str(cell(text))
     assert written.isprintable()
     assert not written.lstrip().startswith(("=", "+", "-", "@"))
+
+
+def test_a_file_that_lacks_a_column_is_named(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    store.append([row(0)])
+    (part,) = store.folder.glob("*.parquet")
+    parquet.write_table(parquet.read_table(part).drop_columns(["digest"]), part)
+    with pytest.raises(OutputError, match=f"{part.name} must be a file of results.*digest"):
+        store.read()
+
+
+def test_texts_that_are_shared_are_those_that_were_written(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    # A file each, so that each has a dictionary of its own.
+    for number in range(3):
+        store.append([row(number, verdict=f"verdict {number % 2}"), row(number, compass=2)])
+    whole = store.read().select(["verdict", "compass", "path"]).to_pylist()
+    assert store.read(["verdict", "compass", "path"]).to_pylist() == whole
+    assert sorted(each["verdict"] for each in whole)[-2:] == ["verdict 0", "verdict 1"]
 
 
 def test_a_spreadsheet_has_a_column_a_number(tmp_path: Path) -> None:

@@ -179,6 +179,22 @@ def test_speed_controllers_have_the_currents_of_their_outputs() -> None:
     assert found.esc_current.value.tolist() == [6.75, 8.25]
 
 
+@pytest.mark.parametrize(
+    ("states", "forward"),
+    [
+        ([3, 3, 1, 4, 2, 3], [0, 1, 1, 1, 1, 0]),
+        ([0, 3, 4, 0, 3], [1, 1, 0]),
+        ([0, 0], None),
+        ([], None),
+    ],
+    ids=["there and back", "not told at first", "no VTOL", "silent"],
+)
+def test_a_vtol_is_on_its_way_from_the_last_time_it_hovered(states, forward) -> None:
+    sender = Sender()
+    found = recording_of(*map(sender.vtol, states)).forward
+    assert (None if found is None else found.value.tolist()) == forward
+
+
 def test_position_comes_from_the_estimate_or_else_from_the_gps() -> None:
     sender = Sender()
     gps = [

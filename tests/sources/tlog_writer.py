@@ -105,6 +105,9 @@ class Sender:
         nothing = [0, 0, 0, 0]
         return self.frame(kind(bytes(4), nothing, list(centiamps), nothing, nothing, nothing))
 
+    def vtol(self, state: int) -> bytes:
+        return self.frame(dialect.MAVLink_extended_sys_state_message(state, 0))
+
     def parameter(self, name: str, value: float, kind: int = 9) -> bytes:
         return self.frame(
             dialect.MAVLink_param_value_message(name.encode(), value, kind, 1000, 65535)

@@ -100,9 +100,9 @@ def _candidates(octets: ByteArray) -> IntArray:
     """Places of A3 95, increasing."""
     if len(octets) < _HEAD_SIZE:
         return np.zeros(0, dtype=np.intp)
-    is_head = octets[: 1 - _HEAD_SIZE] == _HEAD[0]
-    is_head &= octets[1 : 2 - _HEAD_SIZE] == _HEAD[1]
-    return np.flatnonzero(is_head)
+    # The second byte is looked at only where the first one is right: a fifth of the time.
+    first = np.flatnonzero(octets[: 1 - _HEAD_SIZE] == _HEAD[0])
+    return np.asarray(first[octets[first + 1] == _HEAD[1]])
 
 
 def _whole(places: IntArray, size: int, length: int) -> IntArray:
