@@ -130,6 +130,7 @@ def test_the_options_by_which_a_vehicle_is_reached_can_be_given_again(tmp_path):
     assert usual.options == ()
     key = tmp_path / "my key"
     other = LinkOptions(3, 2, 57600, bytes(32), 5.0, 200, key)
+    assert "key=" not in repr(other)  # what is logged of it never shows the key
     assert shlex.join(other.options) == (
         "--system 3 --component 2 --baud 57600 "
         f"--signing-key {shlex.quote(str(key))} --source-system 200"
