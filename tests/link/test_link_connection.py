@@ -160,6 +160,14 @@ def test_a_slow_serial_line_is_asked_for_no_more_than_it_carries(baud):
     assert (sum(asked.values()) == sum(DEFAULT_RATES.values())) is whole
 
 
+def test_a_px4_is_asked_for_the_message_of_its_first_compass():
+    address, living = over_udp(FakeVehicle(autopilot=mavlink.MAV_AUTOPILOT_PX4))
+    with living, connect(address, system=1) as link:
+        until(link, lambda: link.vehicle is not None)
+        link.request_streams({"RAW_IMU": 10.0, "ATTITUDE": 20.0}, PATIENCE_S)
+        assert link.requested_rates == {"SCALED_IMU": 10.0, "ATTITUDE": 20.0}
+
+
 class TestComingBack:
     def test_a_tcp_vehicle_that_closes_and_returns_is_gone_on_with(self, tmp_path):
         port = free_port()
