@@ -93,6 +93,15 @@ def as_ardupilot(
     return scale * (raw + vector("OFS")) @ soft_iron + np.multiply.outer(amperes, motor)
 
 
+NOTHING = {
+    "COMPASS_MOTCT": 0.0,
+    "COMPASS_OFS_X": 5.0,
+    "COMPASS_OFS_Y": -10.0,
+    "COMPASS_OFS_Z": 8.0,
+}
+"""A vehicle nobody ever calibrated."""
+
+
 @dataclass(frozen=True)
 class Flown:
     """How a recording is made.

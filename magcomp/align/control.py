@@ -10,6 +10,7 @@ does not bias a slope the way an error of interpolation does.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -42,6 +43,7 @@ _CLEARLY_SHORTER = 0.9
 _TIMES_SMOOTHED = 5.0
 _LEAST_ROWS = 30
 POWERS = (1, 2, 3)
+_EXPONENTS, _FINE_EXPONENT = (0.4, 3.6, 0.4), 0.01
 _LEAST_EXPLAINED = 0.8
 _FINER = 4.0
 _CUT_SHARE = 0.1
@@ -55,7 +57,7 @@ _STEPS_SEEN = 0.4
 _CLEARLY_SMOOTHED = 0.97
 _FEWEST = 2
 _STEPS_OF_SMOOTHING = 4
-_MOST_REGRESSED = 20_000
+_MOST_REGRESSED, _MOST_FOR_EXPONENT = 20_000, 2_000
 _MOST_ROWS, _MOST_ROWS_A_VALUE = 1_000_000, 50
 """More rows in even steps than this mean that the times are not to be trusted."""
 
@@ -238,7 +240,13 @@ def _best(forms: list[Rebuilt | None]) -> list[Control]:
 
 
 def rebuild(
-    reference: Series, duty: Series, kind: str, name: str, *, measured: bool = False
+    reference: Series,
+    duty: Series,
+    kind: str,
+    name: str,
+    *,
+    measured: bool = False,
+    powers: Sequence[float] = POWERS,
 ) -> Rebuilt | None:
     """The reference regressed on powers of the duty, shape (n, k), sampled more often.
 
@@ -250,8 +258,7 @@ def rebuild(
     """
     if len(reference) < _LEAST_ROWS:
         return None
-    powers = np.array([np.mean(duty.value**k, axis=1) for k in POWERS]).T
-    features = Series(duty.time, powers)
+    features = _features(duty, powers)
     plain = _regressed(reference, features, 0.0)
     if plain is None:
         return None
@@ -267,6 +274,45 @@ def rebuild(
     if not best.cost < _CLEARLY_SMOOTHED * plain.cost:
         best = plain
     return _followed(reference, features, best, kind, name)
+
+
+def _features(duty: Series, powers: Sequence[float]) -> Series:
+    means = [np.mean(duty.value**power, axis=1) for power in powers]
+    return Series(duty.time, np.array(means).T)
+
+
+def exponent_of(reference: Series, drive: Series, shift: float) -> tuple[float, float]:
+    """The power of what drives each motor that a quantity follows best, and what it leaves.
+
+    Parameters
+    ----------
+    reference
+        The sum over the motors, but for a constant share and what drives nothing.
+    drive
+        Of each motor, from 0, shape (n, k).
+    shift
+        By how many seconds the reference comes later.
+
+    Returns
+    -------
+    tuple of float
+        The power, and the mean square as in :class:`Rebuilt`.
+    """
+    few = slice(None, None, -(-len(reference) // _MOST_FOR_EXPONENT))
+    told = Series(reference.time[few], reference.value[few])
+    then = Series(told.time, interpolate(drive, told.time - shift))
+
+    def cost(power: float) -> float:
+        return _regress(told, _features(then, (power,)), 0.0)[1]
+
+    low, high, step = _EXPONENTS
+    tried = {power: cost(power) for power in np.arange(low, high, step).tolist()}
+    while step > _FINE_EXPONENT:
+        step /= 2.0
+        best = min(tried, key=lambda power: tried[power])
+        tried |= {power: cost(power) for power in (best - step, best + step)}
+    best = min(tried, key=lambda power: tried[power])
+    return float(best), tried[best]
 
 
 class _Regressed(NamedTuple):

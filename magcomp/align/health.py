@@ -18,6 +18,9 @@ _WILD_MGAUSS = 120.0
 _JUMPS = 3.0
 _LEAST_READINGS = 30
 _STUCK_SHARE = 0.25
+_SAME_SHARE, _TOP_SHARE, _MORE_OFTEN = 1e-3, 0.1, 3
+_LEAST_CHANGE, _CHANGE_SHARE = 0.005, 0.25
+"""Of the throttle's spread what it still has while the current stands at its top."""
 
 
 def compass_complaints(recording: Recording, compass: int) -> tuple[str, ...]:
@@ -75,13 +78,25 @@ def current_complaints(recording: Recording) -> tuple[str, ...]:
             f"the battery monitor is stuck at {np.interp(start, *_columns(current)):.0f} A from "
             f"{start:.0f} to {end:.0f} s while the throttle changes"
         )
-    at_top = current.value >= top - 1e-3 * max(abs(top), 1.0)
-    if not found and np.mean(at_top) > 0.1 and np.std(working[at_top]) > 0.02:
+    if not found and _saturates(current.value, working, top):
         found.append(
             f"the battery monitor saturates: it never reads above {top:.0f} A, however hard the "
             "motors work"
         )
     return tuple(found)
+
+
+def _saturates(current: FloatArray, working: FloatArray, top: float) -> bool:
+    """Whether the current keeps its largest value while the motors work harder and less hard.
+
+    Where a monitor tells coarse steps, the largest value is no more frequent than the others.
+    """
+    at_top = current >= top - _SAME_SHARE * max(abs(top), 1.0)
+    others = np.unique(current[~at_top], return_counts=True)[1]
+    alone = np.count_nonzero(at_top) > _MORE_OFTEN * int(others.max(initial=0))
+    usual = float(np.std(working))
+    changes = float(np.std(working[at_top])) > max(_LEAST_CHANGE, _CHANGE_SHARE * usual)
+    return bool(np.mean(at_top) > _TOP_SHARE and alone and changes)
 
 
 def _columns(series: Series) -> tuple[FloatArray, FloatArray]:

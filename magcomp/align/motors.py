@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from magcomp.align.between import expected
-from magcomp.align.control import POWERS, duty_of, rebuild, reported, smoothed
+from magcomp.align.control import (
+    POWERS,
+    Rebuilt,
+    duty_of,
+    exponent_of,
+    rebuild,
+    reported,
+    smoothed,
+)
 from magcomp.align.readings import in_gap
 from magcomp.model import (
     DRIVE,
@@ -43,9 +51,9 @@ def currents_of_motors(recording: Recording) -> tuple[Control, ...]:
     Notes
     -----
     Where the speed controller of every motor reports its current, that is its share. Else the
-    battery's current is regressed on powers of all duties. Each power is a sum over the motors, so
-    each motor's share of it is its current. Between the times the shares are told at they are what
-    is to be expected (docs/method.md, Motor by motor).
+    battery's current is regressed on powers of all duties, or on one power of duty times voltage.
+    Each power is a sum over the motors, so each motor's share of it is its current. Between the
+    times the shares are told at they are what is to be expected (docs/method.md, Motor by motor).
     """
     found = _told(recording)
     if found is None or recording.current is None:
@@ -132,18 +140,38 @@ def _told_by_outputs(recording: Recording, current: Series) -> _Told | None:
     duty = duty_of(recording)
     if duty is None or len(duty.numbers) < _LEAST_MOTORS:
         return None
-    found = rebuild(current, duty.series, MOTORS, "battery current")
+    found, driven, powers = _by_powers(recording, current, duty.series)
     if found is None:
         return None
     level, *slopes = found.coefficients
-    curved = sum(
-        slope * duty.series.value**power for slope, power in zip(slopes, POWERS, strict=True)
-    )
+    curved = sum(slope * driven.value**power for slope, power in zip(slopes, powers, strict=True))
     each = np.maximum((level + curved) / len(duty.numbers), 0.0)
     # The battery sags for all motors alike: what outputs do not explain is shared in proportion.
     share = each / np.maximum(each.sum(axis=1, keepdims=True), _LEAST_A)
     total = found.control.series
     return _Told(Series(total.time, share), total, duty.series.time, duty.numbers, "motor outputs")
+
+
+def _by_powers(
+    recording: Recording, current: Series, duty: Series
+) -> tuple[Rebuilt | None, Series, Sequence[float]]:
+    """The current from powers of what drives each motor, and what that is.
+
+    Of the duty; or one power of the duty times the battery's voltage, which is what a motor draws
+    by, where that explains no less: it has fewer numbers, and knows how the battery sags.
+    """
+    plain = rebuild(current, duty, MOTORS, "battery current")
+    drive = drive_of_motors(recording)
+    if plain is None or drive is None or not drive.series.value.any():
+        return plain, duty, POWERS
+    # Of its largest: powers of volts are far from 1.
+    driven = Series(duty.time, drive.series.value / float(drive.series.value.max()))
+    shift = float(plain.control.series.time[0] - duty.time[0])
+    power, cost = exponent_of(current, driven, shift)
+    if cost > plain.cost:
+        return plain, duty, POWERS
+    by_law = rebuild(current, driven, MOTORS, "battery current", powers=(power,))
+    return (plain, duty, POWERS) if by_law is None else (by_law, driven, (power,))
 
 
 def drawn_and_driven(recording: Recording) -> tuple[Control, Control] | None:

@@ -20,7 +20,7 @@ from magcomp.align.health import compass_complaints, current_complaints, vehicle
 from magcomp.align.orientation import orientation_complaint
 from magcomp.analysis.by_evidence import motors_where_better
 from magcomp.analysis.choose import with_speed_controllers
-from magcomp.analysis.compare import Judged, beaten, better
+from magcomp.analysis.compare import Judged, Rival, beaten, better, doubted
 from magcomp.analysis.emit import Emission, emit, what_applies
 from magcomp.analysis.forms import compared, forms_notes
 from magcomp.analysis.missing import controls_of, hover_of, no_motors, with_cure
@@ -138,15 +138,14 @@ def analyse(
     steps = len(kinds) * len(compasses)
     judged: dict[str, list[Judged]] = {}
     lacking: dict[int, MissingDataError] = {}
-    plain: dict[str, tuple[float, ...]] = {}
+    rivals: tuple[Rival, ...] = ()
     for kind in kinds:
         forms = [control for control in (*found, *motors) if control.kind == kind]
         if (
             quantity_of(kind).is_throttle
             and CURRENT in judged
-            and (left := beaten(judged[CURRENT], forms))
+            and (rivals := beaten(judged[CURRENT], forms))
         ):
-            plain[kind] = left
             continue
         for compass in compasses:
             progress(f"compass {compass} by {kind}", sum(map(len, judged.values())) / steps)
@@ -161,6 +160,7 @@ def analyse(
         raise with_cure(recording, compasses[0], lacking[compasses[0]])
     progress("done", 1.0)
     chosen = MOTORS if MOTORS in judged else better(judged)
+    judged[chosen] = list(doubted(judged, chosen, rivals))
     answers = [as_written(recording, each) for each in judged[chosen]]
     forms_of = compared(judged, motors, reported(found).get(THROTTLE))
     if wanted.regressor == "auto" and quantity_of(chosen).of_each:
@@ -172,7 +172,8 @@ def analyse(
         )
     emitted = emit(recording, [each.written for each in answers])
     nothing = all(each.judged.is_rejected for each in answers)
-    held_out = {k: tuple(j.held_out for j in results) for k, results in judged.items()} | plain
+    each_left = judged | ({THROTTLE: rivals} if rivals else {})
+    held_out = {k: tuple(each.held_out for each in found) for k, found in each_left.items()}
     why_not = why_only_to_look_at(recording, chosen)
     return Analysis(
         source=recording.source,

@@ -9,7 +9,7 @@ import numpy as np
 
 from magcomp.errors import MagcompError
 from magcomp.fit import Problem, best_form, fit_alike, solvable
-from magcomp.judge import field_residual
+from magcomp.judge import Thresholds, apart_at_rest, field_residual
 from magcomp.model import CURRENT, MOTORS, THROTTLE, Control, Grade, HeadingError, MotorFit, Verdict
 
 BETTER, CLEARLY_BETTER = 0.97, 0.8
@@ -38,8 +38,24 @@ class Judged:
         return self.verdict.grade is Grade.REJECTED
 
 
-def beaten(by_current: Sequence[Judged], forms: Sequence[Control]) -> tuple[float, ...]:
-    """What throttle leaves on unseen readings where that is plainly no better; else nothing.
+@dataclass(frozen=True, eq=False)
+class Rival:
+    """One compass fitted against the quantity that is not chosen.
+
+    Attributes
+    ----------
+    fit
+        What came out.
+    held_out
+        The residual on unseen readings, mGauss.
+    """
+
+    fit: MotorFit
+    held_out: float
+
+
+def beaten(by_current: Sequence[Judged], forms: Sequence[Control]) -> tuple[Rival, ...]:
+    """Fits by throttle where that is plainly no better; else none.
 
     A fit of its own costs as much as that by current, and is thrown away on most logs. Throttle
     with the same parameters open shows as well that it is not needed.
@@ -53,30 +69,82 @@ def beaten(by_current: Sequence[Judged], forms: Sequence[Control]) -> tuple[floa
 
     Returns
     -------
-    tuple of float
-        mGauss, a compass each; empty where only whole fits can tell.
+    tuple of Rival
+        A compass each; empty where only whole fits can tell.
     """
     if all(each.is_rejected for each in by_current):
         return ()
     if any(each.fit.method != "flight" for each in by_current):
         return ()
     try:
-        left = _left_by(by_current, forms)
+        rivals = _rivals(by_current, forms)
     except MagcompError:
         return ()
+    left = [each.held_out for each in rivals]
     is_better = _typical(left) < BETTER * _typical([each.held_out for each in by_current])
-    return () if is_better else tuple(left)
+    return () if is_better else rivals
 
 
-def _left_by(by_current: Sequence[Judged], forms: Sequence[Control]) -> list[float]:
-    left = []
+def _rivals(by_current: Sequence[Judged], forms: Sequence[Control]) -> tuple[Rival, ...]:
+    rivals = []
     for each in by_current:
         with solvable(each.fit.compass):
             problem = best_form([replace(each.problem, control=form) for form in forms])
             forms = [problem.control]
-            residual, _ = field_residual(problem, fit_alike(problem, each.fit))
-        left.append(residual.held_out)
-    return left
+            alike = fit_alike(problem, each.fit)
+            residual, _ = field_residual(problem, alike)
+        rivals.append(Rival(alike, residual.held_out))
+    return tuple(rivals)
+
+
+def doubted(
+    judged: Mapping[str, Sequence[Judged]],
+    chosen: str,
+    rivals: Sequence[Rival] = (),
+    limits: Thresholds | None = None,
+) -> tuple[Judged, ...]:
+    """The chosen fits, none by current good where throttle says another and explains no less.
+
+    Two quantities that go together in flight need not go together below it: what was never flown
+    is known only as far as both say the same. Which of them the field follows is a matter of the
+    vehicle, so all its compasses together tell which explains less.
+
+    Parameters
+    ----------
+    judged
+        Every compass fitted and judged, by kind.
+    chosen
+        The kind that is to be written.
+    rivals
+        By throttle, where it was fitted in short only.
+    limits
+        The limits; the defaults are the product's.
+    """
+    if chosen != CURRENT:
+        return tuple(judged[chosen])
+    by_throttle = rivals or [Rival(each.fit, each.held_out) for each in judged.get(THROTTLE, ())]
+    by_compass = {rival.fit.compass: rival for rival in by_throttle}
+    both = [each for each in judged[chosen] if each.fit.compass in by_compass]
+    left = [by_compass[each.fit.compass].held_out for each in both]
+    if not both or _typical(left) > _typical([each.held_out for each in both]):
+        return tuple(judged[chosen])
+    most = (limits or Thresholds()).good_deg
+    return tuple(_doubted(each, by_compass.get(each.fit.compass), most) for each in judged[chosen])
+
+
+def _doubted(each: Judged, rival: Rival | None, most: float) -> Judged:
+    if each.verdict.grade is not Grade.GOOD or rival is None:
+        return each
+    apart = apart_at_rest(each.fit, rival.fit.correction)
+    if apart <= most:
+        return each
+    reason = (
+        f"throttle explains the field as well as current, and the two differ by {apart:.0f}° at "
+        "rest: fly descents with the motors working little, and make sure that the battery monitor "
+        "measures all that the motors draw"
+    )
+    verdict = replace(each.verdict, grade=Grade.MARGINAL, reasons=(reason, *each.verdict.reasons))
+    return replace(each, verdict=verdict)
 
 
 def better(judged: Mapping[str, Sequence[Judged]]) -> str:

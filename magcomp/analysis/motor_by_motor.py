@@ -29,7 +29,7 @@ from magcomp.model import (
     quantity_of,
 )
 
-_LEAST_EXPONENT, _STEPS = 0.3, 35
+_LEAST_EXPONENT, _STEPS, _FINE = 0.3, 18, 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,10 +84,7 @@ def as_written(recording: Recording, judged: Judged) -> Answer:
         return _answer(recording, judged, single, {}, told)
     drawn, drive = rows
     added = fit.correction.added(drawn)
-    exponents = np.linspace(_LEAST_EXPONENT, law.most_exponent, _STEPS)
-    exponent = min(
-        exponents.tolist(), key=lambda e: float(np.sum(nearest(added, drive**e)[1] ** 2))
-    )
+    exponent = _exponent(added, drive, law.most_exponent)
     found, left = nearest(added, drive**exponent)
     by_law = AsWritten(MOTORS, exponent, left_deg(left, whole, samples))
     if by_law.left_deg > told.left_deg:
@@ -101,6 +98,22 @@ def as_written(recording: Recording, judged: Judged) -> Answer:
         soft_iron_fitted="diagonal" in fit.free,
     )
     return _answer(recording, judged, single, parameters, by_law)
+
+
+def _exponent(added: FloatArray, drive: FloatArray, most: float) -> float:
+    """The exponent of the drive, up to the most, by which a field is followed best."""
+
+    def cost(exponent: float) -> float:
+        return float(np.sum(nearest(added, drive**exponent)[1] ** 2))
+
+    tried = {each: cost(each) for each in np.linspace(_LEAST_EXPONENT, most, _STEPS).tolist()}
+    step = (most - _LEAST_EXPONENT) / (_STEPS - 1)
+    while step > _FINE:
+        step /= 2.0
+        best = min(tried, key=lambda each: tried[each])
+        around = (max(best - step, _LEAST_EXPONENT), min(best + step, most))
+        tried |= {each: cost(each) for each in around}
+    return float(min(tried, key=lambda each: tried[each]))
 
 
 def _answer(

@@ -101,6 +101,7 @@ class ArduPilot:
     kept_names = KEPT
     batteries = (0,)
     takes_over_all = True
+    parameter_file = ".param"
     first_slot_leads = True
     first_compass_message = "RAW_IMU"
     offset_decimals = 2

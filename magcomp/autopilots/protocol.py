@@ -94,6 +94,11 @@ class Autopilot(Protocol):
         ...
 
     @property
+    def parameter_file(self) -> str:
+        """How a parameter file's name ends that its usual ground station loads."""
+        ...
+
+    @property
     def takes_over_all(self) -> bool:
         """Whether every value that is written comes into force, however little it changes."""
         ...

@@ -108,6 +108,7 @@ class Px4:
     kept_names = KEPT
     batteries = (0, 1)
     takes_over_all = False
+    parameter_file = ".params"
     first_slot_leads = False
     first_compass_message = "SCALED_IMU"
     offset_decimals = 4

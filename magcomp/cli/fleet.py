@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-import sys
 import time
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from itertools import islice
@@ -22,6 +20,7 @@ from magcomp.cli.fleet_options import (
     results_option,
     worker_options,
 )
+from magcomp.cli.fleet_progress import progress
 from magcomp.cli.options import json_option, verbose_option
 from magcomp.cli.output import answer, look
 from magcomp.errors import ExitCode, UsageError
@@ -185,7 +184,7 @@ def carry_out_on(paths: Iterable[str], wanted: Wanted, runner: Runner) -> tuple[
     store = Store(wanted.results)
     known = known_of(store)
     todo = to_do(logs, known, again=wanted.again)
-    with _progress(len(todo)) as step:
+    with progress("fitting logs", len(todo)) as step:
         for outcome in carry_out_all(todo, known, store, runner, time.monotonic, wanted.reports):
             step(outcome)
     store.gather()
@@ -222,31 +221,3 @@ def moment_of(day: str | None) -> float:
             f"--since must be a day such as 2024-05-31; instead received {day}"
         ) from error
     return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
-
-
-@contextmanager
-def _progress(total: int) -> Iterator[Callable[[Outcome], None]]:
-    """Show on stderr how far the run is and how long it will take, if stderr is a terminal."""
-    if sys.stderr is None or not sys.stderr.isatty() or not total:
-        yield lambda _outcome: None
-        return
-    from rich.console import Console  # noqa: PLC0415
-    from rich.progress import (  # noqa: PLC0415
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeRemainingColumn,
-    )
-
-    parts = (
-        TextColumn("fitting logs"),
-        BarColumn(bar_width=30),
-        MofNCompleteColumn(),
-        TextColumn("{task.percentage:>3.0f} %"),
-        TimeRemainingColumn(),
-        TextColumn("left"),
-    )
-    with Progress(*parts, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("", total=total)
-        yield lambda _outcome: bar.advance(task)

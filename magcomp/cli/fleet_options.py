@@ -13,6 +13,7 @@ from urllib.parse import quote
 
 import click
 
+from magcomp.cli.fleet_progress import progress
 from magcomp.cli.output import complain
 from magcomp.errors import OutputError, UsageError
 from magcomp.fleet import as_html, as_table, cluster
@@ -178,9 +179,11 @@ class Outputs:
             page = as_html.html(fleet, _links(results / _REPORTS, self.page.parent))
             write_text(self.page, page, force=self.force)
         if self.parameters is not None:
-            for each in write_all(fleet.aircraft, self.parameters, force=self.force):
-                if each.path is None:
-                    complain(f"no parameters for {each.aircraft}: {each.why}")
+            with progress("writing parameters", len(fleet.aircraft)) as step:
+                for each in write_all(fleet.aircraft, self.parameters, force=self.force):
+                    step(each)
+                    if each.path is None:
+                        complain(f"no parameters for {each.aircraft}: {each.why}")
 
 
 def _links(reports: Path, beside: Path) -> Mapping[str, str]:

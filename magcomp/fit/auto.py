@@ -1,4 +1,4 @@
-"""Which method, which form of the control quantity, and how much to leave free."""
+"""Which method, and which form of the control quantity."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from magcomp.errors import FitRejectedError, MissingDataError, UsageError
+from magcomp.fit.beliefs import with_wander
 from magcomp.fit.combine import still_rows, with_sweep
 from magcomp.fit.field_model import (
     FIELD_LAG,
@@ -28,15 +29,12 @@ from magcomp.fit.flight import (
     correction_of,
     estimate,
     estimate_lags,
-    is_calibrated,
     near,
-    with_wander,
 )
-from magcomp.fit.folds import folds
+from magcomp.fit.freedom import MOST_FREE, QUICK, choose_freedom
 from magcomp.fit.levels import centres_of_flight, fit_levels, usable_levels, with_line
 from magcomp.fit.motors import alike_where_unseen, differences_of, no_surer_than
-from magcomp.fit.residual import residuals, spread
-from magcomp.fit.robust import Estimate
+from magcomp.fit.residual import residuals
 from magcomp.fit.sweep import fit_sweep, is_still
 from magcomp.model import (
     MOTOR,
@@ -50,28 +48,10 @@ from magcomp.model import (
 
 METHODS = ("auto", "sweep", "levels", "flight")
 
-WORTH = 1.1
-"""A more open fit must lower the unexplained field by this factor to be believed.
-
-A little is always gained: errors of the current move the readings along one direction, and a
-soft iron that shrinks that direction seems to fit better.
-"""
-
-CLEAR = 1.5
-"""Beyond this factor a look at held-out readings would only repeat what is plain."""
-
-SHARP_OFFSET = 0.05
-"""Opened offsets must be known to this share of the field's strength."""
-
-LEAST_SOFT_IRON, MOST_SOFT_IRON = 0.6, 1.6
-"""Soft iron of a compass that can be used at all has its eigenvalues between these."""
-
 CERTAIN_MGAUSS = 0.5
 """A tenth of a degree of heading: which of two centres is known better does not matter below."""
 
 LEAST_READINGS = 60
-_MOST_FREE = len(GROUPS)
-_QUICK = 2
 
 
 def fit(problem: Problem, method: str = "auto") -> MotorFit:
@@ -201,7 +181,7 @@ def fit_flight(problem: Problem) -> MotorFit:
     """
     still = still_rows(problem.sample(Lags())) if problem.control.parts == 1 else None
     flown = problem if still is None else problem.where(~still)
-    plain, opened = _choose_freedom(flown)
+    plain, opened = choose_freedom(flown)
     found, free = with_wander(flown, plain, opened)
     tell = differences_of(len(found.parameters))
     told_apart = np.empty((0, 0))
@@ -242,7 +222,7 @@ def fit_alike(problem: Problem, fit: MotorFit) -> MotorFit:
     found = estimate(problem, free, start=begin, with_covariance=False, rounds=1)
     errors = errors_of(problem.sample(lags_of(found.parameters)), found.parameters)
     found = estimate(
-        problem, free, start=found.parameters, errors=errors, with_covariance=False, rounds=_QUICK
+        problem, free, start=found.parameters, errors=errors, with_covariance=False, rounds=QUICK
     )
     return _of_flight(problem, found, free)
 
@@ -273,102 +253,6 @@ def _of_flight(problem: Problem, found: FlightEstimate, free: int) -> MotorFit:
         count=len(samples),
         numbers=problem.control.numbers,
     )
-
-
-def _choose_freedom(problem: Problem) -> tuple[FlightEstimate, int]:
-    """The least open fit that explains the field nearly as well as the most open admissible one.
-
-    Admissible is what the data determine: see :func:`is_determined`. Candidates are compared at
-    the lags of the most open fit; the chosen one estimates its own.
-    """
-    if not is_calibrated(problem.readings.in_force[-1].correction):
-        return estimate(problem, _MOST_FREE), _MOST_FREE
-    most, opened = _most_open(problem)
-    least = _typical(opened.noise)
-    for free in range(1, most):
-        tried = estimate(
-            problem,
-            free,
-            start=opened.parameters,
-            hold_lags=True,
-            errors=opened.errors,
-            with_covariance=False,
-            rounds=_QUICK,
-        )
-        ratio = _typical(tried.noise) / least
-        if ratio <= WORTH or (
-            free == most - 1
-            and ratio < CLEAR
-            and not _pays_on_unseen(problem, (tried, free), (opened, most))
-        ):
-            return estimate(problem, free, start=tried.parameters, errors=opened.errors), free
-    return opened, most
-
-
-def _most_open(problem: Problem) -> tuple[int, FlightEstimate]:
-    """The most open fit whose parameters the data determine.
-
-    With motors alone where they determine no more, unless the data contradict the calibration in
-    force: then the open fit stands with its wide covariance, for undetermined means unknown.
-    """
-    widest = estimate(problem, _MOST_FREE)
-    if is_determined(widest, problem.earth.strength):
-        return _MOST_FREE, widest
-    for free in range(_MOST_FREE - 1, 1, -1):
-        found = estimate(problem, free)
-        if is_determined(found, problem.earth.strength):
-            return free, found
-    closed = estimate(problem, 1)
-    if _typical(closed.noise) > WORTH * _typical(widest.noise):
-        return _MOST_FREE, widest
-    return 1, closed
-
-
-def is_determined(found: Estimate, strength: float) -> bool:
-    """Whether opened offsets and soft iron came out sharp and possible.
-
-    A flight that hardly tilts cannot tell an offset along z from a soft iron along z; the
-    solution then runs away along that valley.
-    """
-    offset_std = float(np.sqrt(np.max(np.diag(found.covariance)[OFFSET])))
-    values = np.linalg.eigvalsh(correction_of(found).soft_iron)
-    possible = values[0] > LEAST_SOFT_IRON and values[-1] < MOST_SOFT_IRON
-    return bool(possible and offset_std < SHARP_OFFSET * strength)
-
-
-def _typical(noise: FloatArray) -> float:
-    return float(np.exp(np.mean(np.log(noise))))
-
-
-def _pays_on_unseen(
-    problem: Problem, closed: tuple[FlightEstimate, int], opened: tuple[FlightEstimate, int]
-) -> bool:
-    """Whether the open fit also predicts held-out readings better."""
-    fold = folds(problem.readings.time)
-    scores = []
-    for found, free in (closed, opened):
-        lags = lags_of(found.parameters)
-        left = []
-        for index in range(int(fold.max()) + 1):
-            part = estimate(
-                problem.where(fold != index),
-                free,
-                start=found.parameters,
-                hold_lags=True,
-                errors=found.errors,
-                with_covariance=False,
-            )
-            unseen = problem.where(fold == index).sample(lags)
-            left.append(
-                residuals(
-                    unseen,
-                    correction_of(part),
-                    float(part.parameters[STRENGTH]),
-                    vertical_of(part.parameters),
-                )
-            )
-        scores.append(spread(np.concatenate(left)))
-    return scores[1] < scores[0]
 
 
 def _why(free: int) -> str:
@@ -403,4 +287,4 @@ def best_form(problems: Sequence[Problem]) -> Problem:
         return problems[0]
     if is_still(problems[0].sample(Lags())):
         return min(problems, key=lambda p: fit_sweep(p).noise)
-    return min(problems, key=lambda p: estimate(p, _MOST_FREE, with_covariance=False).cost)
+    return min(problems, key=lambda p: estimate(p, MOST_FREE, with_covariance=False).cost)

@@ -16,7 +16,7 @@ off-diagonal of the soft iron, each group with the calibration in force as prior
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -41,7 +41,6 @@ from magcomp.fit.field_model import (
     indices_of_correction,
     lags_of,
     rows_and_errors,
-    rows_of,
     strength_and_dip,
 )
 from magcomp.fit.robust import (
@@ -54,7 +53,6 @@ from magcomp.fit.robust import (
     solve,
     time_blocks,
 )
-from magcomp.fit.wander import Posterior, Reduced, Rows, likeliest, mixed, posterior, weighed
 from magcomp.model import (
     CORRECTION_SIZE,
     MOTOR,
@@ -109,17 +107,6 @@ UNPROVEN_OFFSET_MGAUSS, UNPROVEN_SOFT_IRON = 12.0, 0.015
 
 NEVER_CALIBRATED_MGAUSS = 20.0
 """Offsets shorter than this beside an untouched soft iron are what a vehicle is delivered with."""
-
-_BELIEFS = (
-    (4, OPEN_OFFSET_MGAUSS, OPEN_SOFT_IRON, 1.0),
-    (3, UNPROVEN_OFFSET_MGAUSS, UNPROVEN_SOFT_IRON, 1.0),
-    (1, TRUSTED_OFFSET_MGAUSS, TRUSTED_SOFT_IRON, 0.25),
-)
-"""Groups that move, how far offsets and soft iron of the calibration in force may be off, and how
-often that is so: a calibration as good as the last is rare, and data that say little favour it."""
-
-_SIZES_UNKNOWN = 1.16
-"""Standard errors are wider by this, for the sizes of what wanders are themselves estimates."""
 
 BLOCK_S = 5.0
 
@@ -290,63 +277,6 @@ def near(problem: Problem, free: int, start: FloatArray) -> FloatArray:
     samples = problem.sample(lags_of(start))
     (values, slopes, _), _ = rows_and_errors(samples, start)
     return one_step(values, slopes, start, _with_lags_held(prior(problem, free)))
-
-
-def with_wander(problem: Problem, found: FlightEstimate, free: int) -> tuple[FlightEstimate, int]:
-    """The same estimate with what wanders and drifts marginalised, and the groups that moved.
-
-    How far a calibration in force may be off is not known: trusted, ordinary and none are each
-    tried and weighed by how likely they make the data.
-
-    Parameters
-    ----------
-    problem, found
-        The data, and least squares' answer to begin at.
-    free
-        The groups that were open in it; they stand where no marginal solution is possible.
-    """
-
-    def part_at(parameters: FloatArray) -> Reduced:
-        samples = problem.sample(lags_of(parameters))
-        values, slopes, pulls = rows_of(samples, parameters, found.errors)
-        return weighed(Rows(samples.time, values, slopes, pulls * float(np.std(samples.total))))
-
-    calibrated = is_calibrated(problem.readings.in_force[-1].correction)
-    beliefs = [
-        (groups, _believed(problem, offset, soft_iron, is_open=groups == len(GROUPS)), share)
-        for groups, offset, soft_iron, share in (_BELIEFS if calibrated else _BELIEFS[:1])
-    ]
-    first = part_at(found.parameters)
-    wander = likeliest(first, beliefs[0][1], found.parameters)
-    if not wander.shows:
-        # Least squares is less sensitive to a current that is wrong for seconds.
-        return found, free
-    each: dict[int, Posterior] = {}
-    for groups, known, share in beliefs:
-        one = posterior(part_at, found.parameters, known, is_physical, wander, first)
-        if one is not None:
-            each[groups] = replace(one, evidence=one.evidence + float(np.log(share)))
-    if not each:
-        return found, free
-    answer = mixed(each.values())
-    likely = max(each, key=lambda groups: each[groups].evidence)
-    if not is_physical(answer.parameters):
-        answer = each[likely]
-    if not wander.is_clear:
-        # Near the border neither answer is best: where they differ is what is not known.
-        rival = Posterior(found.parameters, found.covariance, answer.evidence, wander)
-        answer = mixed((answer, rival))
-    covariance = _SIZES_UNKNOWN**2 * answer.covariance
-    moved = 1 if likely == 1 else len(GROUPS)
-    return replace(found, parameters=answer.parameters, covariance=covariance), moved
-
-
-def _believed(problem: Problem, offset: float, soft_iron: float, *, is_open: bool) -> Prior:
-    """The prior of a calibration that is off by so much, everything open."""
-    known = prior(problem, len(GROUPS) if is_open else 1)
-    width = known.width.copy()
-    width[OFFSET], width[SOFT_IRON] = offset, soft_iron
-    return Prior(known.mean, width)
 
 
 def _with_lags_held(known: Prior) -> Prior:

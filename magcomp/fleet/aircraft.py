@@ -175,9 +175,7 @@ def _aircraft(
         )
     findings = [*changed, *(each for one in histories for each in one.findings)]
     if not flights:
-        findings.append(
-            Finding(Attention.LOOK, f"none of its {len(unusable)} logs can be used: {newest.why}")
-        )
+        findings.append(Finding(Attention.LOOK, f"{_none_of(len(unusable))} be used: {newest.why}"))
     findings.sort(key=lambda each: -each.attention)
     return Aircraft(
         name=_name(who, newest),
@@ -204,6 +202,10 @@ def _name(who: tuple[str, ...], newest: Flight) -> str:
         case ("compasses", _, kind, system, ids):
             return f"{kind} {system} with compasses {ids}"
     return newest.path
+
+
+def _none_of(logs: int) -> str:
+    return "its only log cannot" if logs == 1 else f"none of its {logs} logs can"
 
 
 def _flights(count: int) -> str:

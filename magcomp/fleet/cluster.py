@@ -26,6 +26,9 @@ _PATIENCE_S = 30.0
 
 _LOOK_S = 2.0
 
+_GIVE_S = 10.0
+"""Time for a worker to give a result, some kB, away."""
+
 
 @contextmanager
 def connected(address: str) -> Iterator[Any]:
@@ -83,6 +86,19 @@ def _check_workers(client: Any, address: str) -> None:
 
 def _version() -> str:
     return __version__
+
+
+def in_this_version(version: str, work: Callable[[_Task], _Result], task: _Task) -> _Result:
+    """Work of a worker, which may have come after the others were asked for their versions.
+
+    Raises
+    ------
+    UsageError
+        Where it has another magcomp: what that found must not stand among results of this one.
+    """
+    if version != __version__:
+        raise UsageError(f"a worker must have magcomp {version}; instead it has {__version__}")
+    return work(task)
 
 
 class Watch:
@@ -144,6 +160,25 @@ def run(
     LinkError
         Where the scheduler is gone.
     """
+    suspects = []
+    for task, future in _done(client, tasks, work, watch):
+        if _killed(future):
+            suspects.append(task)
+        else:
+            yield _outcome(client, task, future, lost, watch)
+    # Who was in hand of a worker that died is blamed with the one it died of: alone only one is.
+    for suspect in suspects:
+        for task, future in _done(client, [suspect], work, watch):
+            yield _outcome(client, task, future, lost, watch)
+
+
+def _done(
+    client: Any,
+    tasks: Iterable[_Task],
+    work: Callable[[_Task], _Result],
+    watch: Watch,
+) -> Iterator[tuple[_Task, Any]]:
+    """Tasks that have come to an end, however, as they do."""
     waiting = iter(tasks)
     running: dict[Any, _Task] = {}
     done: SimpleQueue[Any] = SimpleQueue()
@@ -151,7 +186,7 @@ def run(
     def fill() -> None:
         room = max(_AHEAD * sum(_threads(client).values()), 1) - len(running)
         for task in islice(waiting, max(room, 0)):
-            future = client.submit(work, task, pure=False)
+            future = client.submit(in_this_version, __version__, work, task, pure=False)
             running[future] = task
             future.add_done_callback(done.put)
 
@@ -163,13 +198,12 @@ def run(
             except Empty:
                 watch.look(len(_threads(client)))
                 continue
-            task = running.pop(future)
-            if future.status == "finished":
-                yield future.result()
-            else:
-                # A scheduler that is gone cancels all, and no log is to blame for that.
+            # A scheduler that is gone cancels all, and no log is to blame for that.
+            if future.status == "cancelled":
                 _threads(client)
-                yield lost(task, _why(future))
+            yield running.pop(future), future
+            # What a worker still holds as it dies would be done once more, for nobody.
+            future.release()
             fill()
     finally:
         # A scheduler that is gone has nothing left to cancel.
@@ -191,10 +225,26 @@ def _threads(client: Any) -> dict[str, int]:
     return threads
 
 
-def _why(future: Any) -> str:
+def _killed(future: Any) -> bool:
+    """Whether every worker that tried it died."""
+    return future.status == "error" and type(future.exception()).__name__ == "KilledWorker"
+
+
+def _outcome(
+    client: Any, task: _Task, future: Any, lost: Callable[[_Task, str], _Result], watch: Watch
+) -> _Result:
+    # The worker that has the result may die before it gives it away.
+    while future.status not in ("cancelled", "error"):
+        try:
+            result: _Result = future.result(timeout=_GIVE_S)
+        except TimeoutError:
+            watch.look(len(_threads(client)))
+        else:
+            return result
     if future.status == "cancelled":
-        return "the cluster must carry it out; instead it was cancelled there"
+        return lost(task, "the cluster must carry it out; instead it was cancelled there")
+    if _killed(future):
+        return lost(task, "its worker must live; instead every one that tried it died")
     error = future.exception()
-    if type(error).__name__ == "KilledWorker":
-        return "its worker must live; instead every one that tried it died"
-    return f"the cluster must carry it out; instead it failed: {type(error).__name__}: {error}"
+    why = f"the cluster must carry it out; instead it failed: {type(error).__name__}: {error}"
+    return lost(task, why)

@@ -47,27 +47,49 @@ class Finding:
         How soon.
     text
         A clause, for people.
+    degrees
+        Of heading, which the clause names; compasses that differ in this alone are told together.
     """
 
     attention: Attention
     text: str
+    degrees: float = math.nan
 
 
 def texts(findings: Iterable[Finding]) -> list[str]:
-    """What the findings say, once where it is the same of several compasses.
+    """What the findings say, once where it is the same of several compasses but for the degrees.
 
     Examples
     --------
-    >>> each = [Finding(Attention.ACT, f"compass {slot}: it drifts") for slot in (1, 3)]
+    >>> each = [Finding(Attention.ACT, f"compass {n}: off by {n}.0°", n) for n in (1, 3)]
     >>> texts([*each, Finding(Attention.LOOK, "its board changed")])
-    ['compasses 1 and 3: it drifts', 'its board changed']
+    ['compasses 1 and 3: off by up to 3.0°', 'its board changed']
     """
-    said: dict[str, list[int]] = {}
+    said: dict[tuple[str, str], tuple[list[int], list[float]]] = {}
     for finding in findings:
         of_one = _OF_ONE.fullmatch(finding.text)
         text = finding.text if of_one is None else of_one["text"]
-        said.setdefault(text, []).extend([] if of_one is None else [int(of_one["slot"])])
-    return [f"{words.compasses(slots)}: {text}" if slots else text for text, slots in said.items()]
+        before, named, after = text.partition(_degrees(finding.degrees))
+        slots, degrees = said.setdefault((before, after), ([], []))
+        slots.extend([] if of_one is None else [int(of_one["slot"])])
+        degrees.extend([finding.degrees] if named else [])
+    return [
+        f"{words.compasses(sorted(slots))}: {text}" if slots else text
+        for (before, after), (slots, degrees) in said.items()
+        for text in [f"{before}{_up_to(before, degrees)}{after}"]
+    ]
+
+
+def _up_to(before: str, degrees: Sequence[float]) -> str:
+    alike = {_degrees(each) for each in degrees}
+    if len(alike) < 2:
+        return "".join(alike)
+    known = before.endswith(("up to ", "about "))
+    return f"{'' if known else 'up to '}{_degrees(max(degrees))}"
+
+
+def _degrees(value: float) -> str:
+    return f"{value:.1f}°"
 
 
 def scattering(slot: int, count: int, degrees: float, at: float, regressor: str) -> Finding:
@@ -75,7 +97,8 @@ def scattering(slot: int, count: int, degrees: float, at: float, regressor: str)
     return Finding(
         Attention.LOOK,
         f"compass {slot}: what the motors add differs between {count} flights by about "
-        f"{degrees:.1f}° of heading at {quantity(at, regressor)}: they have no common answer",
+        f"{_degrees(degrees)} of heading at {quantity(at, regressor)}: they have no common answer",
+        degrees,
     )
 
 
@@ -95,8 +118,9 @@ def of_newest(slot: int, newest: Flight, holds: Holds, limits: Thresholds) -> It
         yield Finding(
             Attention.ACT if holds is Holds.NO else Attention.LOOK,
             f"compass {slot}: the calibration in force does not hold: on {date(newest.when)} the "
-            f"heading was wrong by up to {newest.before_deg:.1f}° at {at} (limit "
+            f"heading was wrong by up to {_degrees(newest.before_deg)} at {at} (limit "
             f"{limits.good_deg:g}°)",
+            newest.before_deg,
         )
     elif newest.verdict == Grade.REJECTED:
         first = newest.reasons.partition("\n")[0]
@@ -110,18 +134,18 @@ def changed_since(
     slot: int, kind: str, when: float, degrees: float, at: float, regressor: str
 ) -> Finding:
     """What the motors add is not what it was."""
-    where = f"{degrees:.1f}° of heading at {quantity(at, regressor)}"
+    where = f"{_degrees(degrees)} of heading at {quantity(at, regressor)}"
     if kind == "step":
         text = f"what the motors add changed on {date(when)} by {where}: was something moved?"
     else:
         text = f"what the motors add has drifted since {date(when)} by {where}"
-    return Finding(Attention.ACT, f"compass {slot}: {text}")
+    return Finding(Attention.ACT, f"compass {slot}: {text}", degrees)
 
 
 def why(flight: Flight, others: Sequence[Flight], degrees: float) -> str:
     """What is different about a flight that disagrees with others, as far as the rows tell."""
     newest = others[-1]
-    found = [f"{degrees:.1f}° apart"]
+    found = [f"{_degrees(degrees)} apart"]
     if flight.verdict == Grade.MARGINAL:
         found.append(f"marginal: {flight.reasons.partition(chr(10))[0]}")
     if flight.firmware != newest.firmware:

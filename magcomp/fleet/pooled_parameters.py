@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -45,8 +45,8 @@ class Written:
     why: str = ""
 
 
-def write_all(aircraft: Iterable[Aircraft], folder: Path, *, force: bool) -> tuple[Written, ...]:
-    """Write a parameter file for each aircraft whose newest flights give one.
+def write_all(aircraft: Iterable[Aircraft], folder: Path, *, force: bool) -> Iterator[Written]:
+    """Write a parameter file for each aircraft whose newest flights give one, and tell of each.
 
     Parameters
     ----------
@@ -58,16 +58,14 @@ def write_all(aircraft: Iterable[Aircraft], folder: Path, *, force: bool) -> tup
         Whether files that are there may be replaced.
     """
     names: set[str] = set()
-    done = []
     for each in aircraft:
         path = folder / f"{_file_name(each, names)}.param"
         try:
             write_parameter_file(path, parameters_of(each), force=force)
         except MagcompError as error:
-            done.append(Written(each.name, None, str(error)))
+            yield Written(each.name, None, str(error))
         else:
-            done.append(Written(each.name, path))
-    return tuple(done)
+            yield Written(each.name, path)
 
 
 def _file_name(each: Aircraft, taken: set[str]) -> str:

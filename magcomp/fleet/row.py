@@ -10,8 +10,9 @@ from enum import StrEnum
 from typing import Any
 
 from magcomp import __version__
+from magcomp.judge.judge import error_at
 from magcomp.model import Analysis, CompassResult, Correction, Recording
-from magcomp.model.fit import CORRECTION_SIZE, pack
+from magcomp.model.fit import CORRECTION_SIZE, HeadingError, MotorFit, Verdict, pack
 
 MOTOR_COVARIANCE_SIZE = 6
 
@@ -199,7 +200,7 @@ def _row(
 ) -> Row:
     fit, verdict = result.fit, result.verdict
     ids = {each.slot: each.device_id for each in recording.vehicle.compasses}
-    errors = verdict.heading_error
+    errors = _flown(fit, verdict)
     covariance = fit.shared_covariance
     pairs = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
     return Row(
@@ -212,9 +213,9 @@ def _row(
         method=fit.method,
         regressor=fit.regressor,
         kept=fit.kept,
-        before_deg=_largest(e.before for e in errors if e.u <= fit.u_high),
-        after_deg=_largest(e.after for e in errors if e.u <= fit.u_high),
-        bound_deg=_largest(e.p95 for e in errors if e.u <= fit.u_high),
+        before_deg=_largest(e.before for e in errors),
+        after_deg=_largest(e.after for e in errors),
+        bound_deg=_largest(e.p95 for e in errors),
         u_low=float(fit.u_low),
         u_high=float(fit.u_high),
         seconds=float(verdict.coverage.seconds),
@@ -229,6 +230,14 @@ def _row(
         parameters=json.dumps(dict(result.parameters)),
         notes="\n".join(analysis.notes),
     )
+
+
+def _flown(fit: MotorFit, verdict: Verdict) -> list[HeadingError]:
+    """The heading errors up to the top of what was flown, which lies between two of the table."""
+    errors = verdict.heading_error
+    if not errors:
+        return []
+    return [*(each for each in errors if each.u <= fit.u_high), error_at(errors, fit.u_high)]
 
 
 def _of_one_part(correction: Correction) -> tuple[float, ...]:

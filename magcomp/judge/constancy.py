@@ -33,7 +33,10 @@ from magcomp.model import (
 )
 
 _SPLITS = (0.2, 0.35, 0.5, 0.65, 0.8)
-_LEAST_SIGMA = 3.5
+_LEAST_SIGMA, _LEAST_SIGMA_OF_A_CURVE = 3.5, 3.0
+"""What is looked for at several moments, the largest counting, is larger by chance; a bend is
+looked for once."""
+
 _BLOCK_S = 15.0
 _USUAL_DRIFT_MGAUSS = 3.0
 _WIDEST = 0.1
@@ -76,7 +79,7 @@ class Departure:
     @property
     def is_plain(self) -> bool:
         """Whether it is more than its own error explains."""
-        return self.sigmas > _LEAST_SIGMA
+        return self.sigmas > (_LEAST_SIGMA_OF_A_CURVE if self.kind == "curve" else _LEAST_SIGMA)
 
 
 @dataclass(frozen=True, eq=False)

@@ -234,6 +234,23 @@ def _field_at(fit: MotorFit, roll: FloatArray, pitch: FloatArray, yaw: FloatArra
     return np.asarray(body_from_earth(roll, pitch, yaw) @ earth)
 
 
+def apart_at_rest(fit: MotorFit, other: Correction) -> float:
+    """Largest heading error, degrees, of another correction with the motors off, by this fit.
+
+    Parameters
+    ----------
+    fit
+        Its correction is taken as the truth.
+    other
+        By whatever control quantity: at rest each is 0.
+    """
+    roll, pitch, yaw = attitudes()
+    field = _field_at(fit, roll, pitch, yaw)
+    off = np.zeros((len(field), fit.correction.motor.shape[1]))
+    raw = fit.correction.undo(field, off)
+    return largest_shift(other.apply(raw, np.zeros(len(raw))), field, roll, pitch)
+
+
 def largest_shift(
     found: FloatArray, true: FloatArray, roll: FloatArray, pitch: FloatArray
 ) -> float:

@@ -13,7 +13,7 @@ from magcomp.judge.constancy import Departure, departures_of
 from magcomp.judge.evidence import used_lags
 from magcomp.judge.finding import Finding
 from magcomp.judge.thresholds import TWO_SIDED_95, Thresholds
-from magcomp.model import Grade, MotorFit, Samples, quantity_of
+from magcomp.model import Grade, MotorFit, Readings, Samples, quantity_of
 
 _WEAKEST_SHARE, _STRONGEST_SHARE = 0.35, 2.5
 """Hard iron of any size a compass still works with keeps its median field between these shares."""
@@ -21,6 +21,9 @@ _WEAKEST_SHARE, _STRONGEST_SHARE = 0.35, 2.5
 _DIP_WIDTHS = 4.0
 
 _TOO_FEW_FOR_A_LINE = 2
+
+_ANEW_MGAUSS = 20.0
+"""Offsets that jump so far were not learnt on the way."""
 
 _DRIFTS = 1.5
 """A step of so many times the limit is no drift whatever the bound."""
@@ -67,7 +70,7 @@ def on_constancy(
         likeliest = max(found, key=lambda d: d.gain)
         yield Finding(
             Grade.MARGINAL if likeliest.degrees < limits.marginal_deg else Grade.REJECTED,
-            _words(likeliest, problem.control.kind),
+            _words(likeliest, problem.control.kind) + _calibrated_anew(problem.readings),
         )
     elif fit.method == "levels" and len(fit.levels) == _TOO_FEW_FOR_A_LINE:
         yield from _on_two_levels(fit, every, limits, bound)
@@ -103,6 +106,22 @@ def _tolerated(departure: Departure, limits: Thresholds, bound: float) -> float:
         return limits.departure_deg
     left = float(np.sqrt(limits.good_deg**2 - bound**2))
     return float(np.clip(left, limits.departure_deg, _DRIFTS * limits.departure_deg))
+
+
+def _calibrated_anew(readings: Readings) -> str:
+    """In words, when another calibration came into force; nothing where none did.
+
+    Offsets that are learnt in flight creep; they do not jump, and soft iron is not learnt.
+    """
+    for change in np.flatnonzero(np.diff(readings.stretch)):
+        before, after = (readings.in_force[readings.stretch[change + k]].correction for k in (0, 1))
+        jump = float(np.linalg.norm(after.offset - before.offset))
+        if jump > _ANEW_MGAUSS or not np.array_equal(after.soft_iron, before.soft_iron):
+            return (
+                f"; at {readings.time[change + 1]:.0f} s another calibration came into force: "
+                "where the flight of another aircraft begins there, fit each part by itself"
+            )
+    return ""
 
 
 def _words(departure: Departure, kind: str) -> str:

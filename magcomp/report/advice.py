@@ -87,7 +87,7 @@ def _write(document: Document, kept: list[int], options: Options | None) -> str:
     how = (
         f"they are in `{where}`"
         if where
-        else f"`{_command(document['source'], options)}` writes them to a file"
+        else f"`{_command(document, options)}` writes them to a file"
     )
     return (
         f"Disarm, then write the parameters of {words.compasses(kept)} with your ground station; "
@@ -95,11 +95,12 @@ def _write(document: Document, kept: list[int], options: Options | None) -> str:
     )
 
 
-def _command(source: str, options: Options | None) -> str:
+def _command(document: Document, options: Options | None) -> str:
     asked = {} if options is None else asdict(options)
     usual = asdict(Options())
     given = [f"--{name} {value}" for name, value in asked.items() if value != usual[name]]
-    return " ".join(["magcomp fit", shlex.quote(source), *given, "-o compass.param"])
+    file = f"compass{autopilots.named(document['vehicle']['autopilot']).parameter_file}"
+    return " ".join(["magcomp fit", shlex.quote(document["source"]), *given, f"-o {file}"])
 
 
 def _left(compass: Mapping[str, Any], switch: str) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console, Group, RenderableType
@@ -11,7 +12,7 @@ from rich.padding import Padding
 from rich.rule import Rule
 from rich.text import Text
 
-from magcomp import __version__
+from magcomp import __version__, autopilots
 from magcomp.align import on_lift_alone
 from magcomp.model import (
     CURRENT,
@@ -29,10 +30,8 @@ from magcomp.report.bend import steps_of
 from magcomp.report.look import Look
 from magcomp.report.roles import roles
 
-_AFTER_WRITING = (
-    "Load it with your ground station (MAVProxy: param load), fly once more, and run magcomp "
-    "check on the new log."
-)
+_LOADED_BY = {".params": "QGroundControl (Parameters, Tools, Load from file)"}
+_LOADED_BY_OTHERS = "your ground station (MAVProxy: param load)"
 
 
 def analysis_text(
@@ -297,16 +296,21 @@ def _ending(
     analysis: Analysis, document: Mapping[str, Any], written: str | None, report: str | None
 ) -> Iterator[RenderableType]:
     yield Text()
+    file = f"compass{autopilots.named(analysis.vehicle.autopilot).parameter_file}"
     accepted = analysis.grade is not Grade.REJECTED
     if analysis.only_to_look_at:
         yield _last("Nothing to write.", words.sentence(analysis.only_to_look_at))
         accepted = False
     elif written is not None:
-        yield _last(f"Written to {words.printable(written)}.", _AFTER_WRITING)
+        loader = _LOADED_BY.get(Path(written).suffix, _LOADED_BY_OTHERS)
+        yield _last(
+            f"Written to {words.printable(written)}.",
+            f"Load it with {loader}, fly once more, and run magcomp check on the new log.",
+        )
     elif plain.WRITE not in map(plain.answer_of, document["compasses"]) and accepted:
-        yield _last("Nothing needs to be written.", "-o compass.param writes a file all the same.")
+        yield _last("Nothing needs to be written.", f"-o {file} writes a file all the same.")
     elif accepted:
-        yield _last("Nothing is written yet.", "Add -o compass.param to write these parameters.")
+        yield _last("Nothing is written yet.", f"Add -o {file} to write these parameters.")
     else:
         yield _last("Nothing to write.", "Mend what the verdict names, record again, fit again.")
     rejected = [c.fit.compass for c in analysis.compasses if c.verdict.grade is Grade.REJECTED]

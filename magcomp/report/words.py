@@ -121,9 +121,16 @@ def vehicle(of: Vehicle) -> str:
 
 
 def sentence(text: str) -> str:
-    """A reason with a capital letter and a full stop, on one line whatever a log said in it."""
-    text = printable(text)
-    return f"{text[:1].upper()}{text[1:]}".rstrip(".") + "."
+    """A reason with a capital letter and its stop, on one line whatever a log said in it.
+
+    Examples
+    --------
+    >>> sentence("it drifts"), sentence("was it moved?")
+    ('It drifts.', 'Was it moved?')
+    """
+    text = printable(text).rstrip(".")
+    stop = "" if text.endswith(("?", "!")) else "."
+    return f"{text[:1].upper()}{text[1:]}{stop}"
 
 
 def printable(name: str) -> str:

@@ -255,7 +255,8 @@ def _start(log: Walked, parts: Mapping[tuple[str, int], list[NDArray[Any]]]) -> 
     # One of them, so that there is a row near it even where half are years from the others.
     middle = float(np.sort(every)[len(every) // 2])
     said = float(log.start)
-    if middle - _DAY_US < said <= middle:
+    # None is said where it was never set.
+    if max(middle - _DAY_US, 0.0) < said <= middle:
         return int(said)
     return int(every[np.abs(every - middle) < _DAY_US].min())
 

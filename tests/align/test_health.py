@@ -139,6 +139,22 @@ def test_a_battery_monitor_that_fails_is_named(sound, change, word):
     assert word in complaint
 
 
+def test_a_monitor_that_saturates_shows_in_a_hover_too(sound):
+    """Where the throttle hardly changes it changes little at the top of the current as well."""
+    saturated = with_current(sound, lambda _, value: np.minimum(value, np.quantile(value, 0.6)))
+    throttle = sound.throttle
+    narrow = Series(throttle.time, 0.45 + 0.1 * (throttle.value - throttle.value.mean()))
+    (complaint,) = current_complaints(replace(saturated, throttle=narrow))
+    assert "saturates" in complaint
+
+
+def test_a_monitor_that_tells_coarse_steps_does_not_saturate(sound):
+    coarse = with_current(sound, lambda _, value: 20.0 * np.rint(value / 20.0))
+    top = coarse.current.value == coarse.current.value.max()
+    assert np.mean(top) > 0.1
+    assert current_complaints(coarse) == ()
+
+
 def test_compasses_that_become_others_are_two_aircraft() -> None:
     ids = (ParameterChange(0.0, "COMPASS_DEV_ID", 97539.0),)
     other = (*ids, ParameterChange(30.0, "COMPASS_DEV_ID", 97540.0))

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from synthetic import Turned, problem_of, with_both
 
 from magcomp.align import controls, expected_earth, readings, reported
-from magcomp.analysis.compare import Judged, beaten, better, comparison
+from magcomp.analysis.compare import Judged, Rival, beaten, better, comparison, doubted
 from magcomp.fit import Problem, fit
-from magcomp.judge import judge
-from magcomp.model import CURRENT, THROTTLE, Control, Grade, Recording
+from magcomp.judge import apart_at_rest, judge
+from magcomp.model import CURRENT, THROTTLE, Control, Grade, MotorFit, Recording
 
 
 def judged(problem: Problem, method: str = "auto") -> Judged:
@@ -40,7 +41,7 @@ def by_current_best() -> tuple[Recording, Judged]:
 
 def test_throttle_that_is_no_better_is_beaten_with_what_a_fit_of_its_own_leaves(by_current_best):
     recording, current = by_current_best
-    (left,) = beaten([current], forms(recording))
+    left = beaten([current], forms(recording))[0].held_out
     assert left > current.held_out
     assert left == pytest.approx(by_throttle(recording).held_out, rel=0.05)
 
@@ -96,6 +97,50 @@ def test_a_throttle_that_is_little_better_must_bound_the_heading_as_well(
     assert better({CURRENT: [current], THROTTLE: [throttle]}) == chosen
     told = comparison({CURRENT: (1.0,), THROTTLE: (left,)}, chosen)
     assert ("bounds the heading better" in told) is (chosen == CURRENT and left < 0.97)
+
+
+@pytest.mark.parametrize(
+    ("left", "apart_deg", "grade"),
+    [(0.99, 2.2, Grade.MARGINAL), (0.99, 1.8, Grade.GOOD), (1.01, 9.0, Grade.GOOD)],
+)
+def test_what_throttle_explains_as_well_it_must_not_contradict_at_rest(
+    left, apart_deg, grade, by_current_best
+):
+    current = by_current_best[1]
+    good = replace(current, verdict=replace(current.verdict, grade=Grade.GOOD))
+    rival = Rival(moved_at_rest(current.fit, apart_deg), left * current.held_out)
+    (found,) = doubted({CURRENT: [good]}, CURRENT, [rival])
+    assert found.verdict.grade is grade
+    told = f"the two differ by {apart_deg:.0f}° at rest"
+    assert (told in found.verdict.reasons[0]) is (grade is Grade.MARGINAL)
+    whole = replace(
+        current, fit=rival.fit, verdict=said(rival.held_out, 1.0, by_current_best).verdict
+    )
+    (by_whole,) = doubted({CURRENT: [good], THROTTLE: [whole]}, CURRENT)
+    assert by_whole.verdict.grade is grade
+    assert doubted({THROTTLE: [good]}, THROTTLE, [rival]) == (good,)
+
+
+def test_all_compasses_tell_together_which_quantity_explains_less(by_current_best):
+    current = by_current_best[1]
+    good = replace(current, verdict=replace(current.verdict, grade=Grade.GOOD))
+    pair = [good, replace(good, fit=replace(good.fit, compass=2))]
+    apart = [moved_at_rest(each.fit, 3.0) for each in pair]
+
+    def grades(*shares: float) -> list[Grade]:
+        rivals = [Rival(f, k * good.held_out) for f, k in zip(apart, shares, strict=True)]
+        return [each.verdict.grade for each in doubted({CURRENT: pair}, CURRENT, rivals)]
+
+    assert grades(0.95, 1.02) == [Grade.MARGINAL] * 2
+    assert grades(0.99, 1.03) == [Grade.GOOD] * 2
+
+
+def moved_at_rest(fit: MotorFit, degrees: float) -> MotorFit:
+    """A fit by whatever quantity whose offset turns the heading by so much with the motors off."""
+    wrong = fit.correction.offset + np.array([0.0, 1.0, 0.0])
+    by_one = apart_at_rest(fit, replace(fit.correction, offset=wrong))
+    offset = fit.correction.offset + np.array([0.0, degrees / by_one, 0.0])
+    return replace(fit, correction=replace(fit.correction, offset=offset))
 
 
 def test_one_kind_alone_is_the_better(by_current_best):

@@ -36,8 +36,8 @@ def test_where_the_firmware_corrects_motor_by_motor_its_law_is_written():
     (result,) = built_in().compasses
     written = result.parameters
     assert result.as_written.regressor == MOTORS
-    assert result.as_written.exponent == pytest.approx(1.5, abs=0.05)
-    assert written["COMPASS_PMOT_EXP"] == pytest.approx(1.5, abs=0.05)
+    assert result.as_written.exponent == pytest.approx(1.5, abs=0.02)
+    assert written["COMPASS_PMOT_EXP"] == pytest.approx(1.5, abs=0.02)
     assert written["COMPASS_PMOT_EN"] == 1.0
     assert not any(name.startswith("COMPASS_MOT") for name in written)
     assert result.as_written.left_deg < 0.5

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from synthetic import EXACT, INTERFERENCE, Flown, problem_of
+from synthetic import EXACT, INTERFERENCE, NOTHING, Flown, problem_of
 
 from magcomp.autopilots import ardupilot
 from magcomp.earth import EarthField
@@ -15,12 +15,6 @@ from magcomp.fit import Problem, fit
 from magcomp.fit.field_model import SIZE, lags_of, strength_and_dip
 from magcomp.fit.flight import TRUSTED_OFFSET_MGAUSS, TRUSTED_SOFT_IRON, is_physical, prior
 from magcomp.model import MotorFit, Series, pack
-
-NOTHING = {
-    "COMPASS_MOTCT": 0.0,
-    **ardupilot.vector_parameters("OFS", 1, (5.0, -10.0, 8.0)),
-}
-"""A vehicle nobody ever calibrated."""
 
 
 def weighed(found: MotorFit, names: slice) -> float:

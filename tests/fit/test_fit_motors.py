@@ -10,7 +10,15 @@ import pytest
 from synthetic import INTERFERENCE, earth
 from unequal import VECTORS, Unequal
 
-from magcomp.align import controls, currents_of_motors, readings, to_undo
+from magcomp.align import (
+    controls,
+    currents_of_motors,
+    drawn_and_driven,
+    readings,
+    to_undo,
+)
+from magcomp.align.control import exponent_of
+from magcomp.align.motors import drive_of_motors
 from magcomp.fit import Problem, best_form, fit
 from magcomp.fit.field_model import SIZE
 from magcomp.fit.motors import contrasts, differences_of, no_surer_than
@@ -208,3 +216,28 @@ def test_differences_are_no_better_known_than_by_plain_least_squares():
     common = np.eye(len(root)) - tell.T @ tell
     np.testing.assert_allclose(common @ wide @ common, common @ sure.covariance @ common, atol=1e-9)
     np.testing.assert_array_equal(no_surer_than(sure, plain), np.eye(len(root)))
+
+
+@pytest.mark.parametrize("exponent", [0.65, 1.0, 1.9])
+def test_what_a_motor_draws_is_a_power_of_duty_and_volts_where_that_explains_no_less(exponent):
+    flown = Unequal(seed=3, exponent=exponent, per_motor={"COMPASS_PMOT_EN": 0.0})
+    recording = flown.recording()
+    drive = drive_of_motors(recording).series
+    found, _ = exponent_of(recording.current, drive, 0.0)
+    assert found == pytest.approx(exponent, abs=0.02)
+    drawn, driven = drawn_and_driven(recording)
+    low = driven.series.value < 0.7 * driven.series.value.max()
+    share, of_it = (
+        np.log(each.series.value[low] / each.series.value.max()) for each in (drawn, driven)
+    )
+    assert np.median(share / of_it) == pytest.approx(exponent, abs=0.03)
+
+
+def test_where_volts_explain_less_the_duties_alone_tell_it():
+    flown = Unequal(seed=3, exponent=1.9)
+    recording = flown.recording()
+    volts = recording.voltage
+    wrong = Series(volts.time, volts.value * (1.0 + 0.1 * np.sin(volts.time)))
+    drawn, _ = drawn_and_driven(replace(recording, voltage=wrong))
+    truth = flown.drawn_at(drawn.series.time)
+    assert np.median(np.abs(drawn.series.value / truth - 1.0)) < 0.03

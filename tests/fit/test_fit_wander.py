@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from synthetic import Flown
 
-from magcomp.fit import flight
+from magcomp.fit import beliefs
 from magcomp.fit.field_model import SIZE, TILT
 from magcomp.fit.flight import estimate
 from magcomp.fit.robust import Prior
@@ -143,11 +143,11 @@ def test_near_the_border_both_answers_count(monkeypatch, drift, rivals):
     problem = Flown(seed=1, seconds=60.0).problem()
     least = estimate(problem, 1)
     shown = Wander(drift_mgauss=drift)
-    monkeypatch.setattr(flight, "likeliest", lambda *_: shown)
+    monkeypatch.setattr(beliefs, "likeliest", lambda *_: shown)
     far = Posterior(least.parameters + 1.0, least.covariance, 0.0, shown)
-    monkeypatch.setattr(flight, "posterior", lambda *_: far)
-    found, _ = flight.with_wander(problem, least, 1)
+    monkeypatch.setattr(beliefs, "posterior", lambda *_: far)
+    found, _ = beliefs.with_wander(problem, least, 1)
     apart = (found.parameters - least.parameters)[OFFSET]
     assert np.allclose(apart, rivals / 2.0)
-    wider = np.diag(found.covariance - flight._SIZES_UNKNOWN**2 * least.covariance)[OFFSET]
+    wider = np.diag(found.covariance - beliefs._SIZES_UNKNOWN**2 * least.covariance)[OFFSET]
     assert np.all(wider > 0.2) == (rivals == 1)

@@ -11,7 +11,7 @@ from made_flights import DAY, FIRST, MOTOR, fleet, log_of, row, selected
 from magcomp.fleet.aircraft import aircraft
 from magcomp.fleet.as_json import fleet_object
 from magcomp.fleet.as_text import fleet_text
-from magcomp.fleet.findings import Attention, Holds
+from magcomp.fleet.findings import Attention, Holds, changed_since, scattering, texts
 from magcomp.fleet.flights import select
 from magcomp.fleet.row import Row, State, without_fit
 from magcomp.fleet.run import Known, key
@@ -161,3 +161,22 @@ def test_numbers_that_are_none_are_null() -> None:
     rows = [row(0, before_deg=float("nan"), start_unix_s=float("inf"), strength=float("nan"))]
     document = json.loads(dumps(fleet_object(fleet(rows))))
     assert document["aircraft"][0]["compasses"][0]["flights"][0]["before_deg"] is None
+
+
+def test_compasses_that_differ_in_degrees_alone_are_told_together_by_the_largest() -> None:
+    rows = [row(0, before_deg=9.0), row(0, compass=2, before_deg=12.04), row(0, compass=3)]
+    (found,) = fleet(rows).aircraft
+    (said,) = texts(found.findings)
+    assert said.startswith("compasses 1 and 2: the calibration in force does not hold")
+    assert "wrong by up to 12.0° at" in said
+
+
+def test_what_differs_is_told_as_a_bound_and_what_is_alike_as_it_is() -> None:
+    moved = [
+        changed_since(slot, "step", 1.7e9, degrees, 25.0, "current")
+        for slot, degrees in ((1, 9.0), (2, 12.0))
+    ]
+    assert "by up to 12.0° of heading" in texts(moved)[0]
+    assert "by 9.0° of heading" in texts(moved[:1] * 2)[0]
+    apart = [scattering(slot, 3, 5.0 + slot, 25.0, "current") for slot in (1, 2)]
+    assert "by about 7.0° of heading" in texts(apart)[0]

@@ -5,13 +5,15 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager
+from functools import partial
 from typing import Any
 
 import pytest
 from fleet_toys import die_of_three, double, fail_of_three
 
+from magcomp import __version__
 from magcomp.errors import LinkError
-from magcomp.fleet.cluster import Watch, connected, run
+from magcomp.fleet.cluster import Watch, connected, in_this_version, run
 
 SILENT = Watch(lambda text: None)
 
@@ -49,6 +51,18 @@ def test_a_piece_that_fails_is_lost_alone(scheduler: str) -> None:
     assert len(results) == 6
 
 
+def test_a_worker_of_another_version_that_came_later_finds_nothing(
+    scheduler: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    other = partial(in_this_version, "another version")
+    monkeypatch.setattr(
+        "magcomp.fleet.cluster.in_this_version", lambda _, work, task: other(work, task)
+    )
+    with connected(scheduler) as client:
+        ((_, why),) = run(client, [1], double, lost, SILENT)
+    assert f"must have magcomp another version; instead it has {__version__}" in why
+
+
 def test_the_scheduler_is_not_given_all_at_once(scheduler: str) -> None:
     taken: list[int] = []
 
@@ -74,6 +88,10 @@ def test_no_scheduler_is_a_link_that_fails(monkeypatch: pytest.MonkeyPatch) -> N
         pass
 
 
+class KilledWorker(Exception):  # noqa: N818 - Dask's name
+    """What a scheduler says of work whose workers all died."""
+
+
 class Future:
     """A piece of work of a `Client`, which says itself when it is done."""
 
@@ -85,8 +103,14 @@ class Future:
     def add_done_callback(self, tell: Callable[[Future], None]) -> None:
         self._told.append(tell)
 
-    def result(self) -> int:
+    def result(self, timeout: float) -> int:
         return self._result
+
+    def exception(self) -> Exception:
+        return KilledWorker()
+
+    def release(self) -> None:
+        self.status = "released"
 
     def end(self, status: str) -> None:
         self.status = status
@@ -100,11 +124,13 @@ class Client:
     def __init__(self, looks: Iterable[int | str]) -> None:
         self.status = "running"
         self.cancelled: list[Future] = []
+        self.given: list[Future] = []
         self._looks = iter(looks)
         self._work: list[Future] = []
 
-    def submit(self, work: Callable[[int], int], task: int, *, pure: bool) -> Future:
-        self._work.append(Future(work(task)))
+    def submit(self, work: Callable[..., int], *given: object, pure: bool) -> Future:
+        self._work.append(Future(work(*given)))
+        self.given.append(self._work[-1])
         return self._work[-1]
 
     def nthreads(self) -> dict[str, int]:
@@ -150,6 +176,33 @@ def test_a_cluster_that_has_lost_its_workers_says_so_once_and_goes_on_when_one_i
 
 
 @pytest.mark.usefixtures("at_once")
+def test_a_result_whose_worker_is_gone_is_not_waited_for_in_silence(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    tries = iter([TimeoutError(), TimeoutError(), 7])
+
+    def result(future: Future, timeout: float) -> int:
+        given = next(tries)
+        if isinstance(given, int):
+            return given
+        raise given
+
+    monkeypatch.setattr(Future, "result", result)
+    told: list[str] = []
+    watch = Watch(told.append, itertools.count(0, 40).__next__)
+    client = Client(itertools.chain([1, 1, 0, 0], itertools.repeat(1)))
+    assert list(run(client, [1], double, lost, watch)) == [7]
+    assert "no worker has been there" in told[0]
+
+
+@pytest.mark.usefixtures("at_once")
+def test_no_worker_holds_what_was_taken() -> None:
+    client = Client(itertools.repeat(1))
+    assert len(list(run(client, range(4), double, lost, SILENT))) == 4
+    assert [each.status for each in client.given] == ["released"] * 4
+
+
+@pytest.mark.usefixtures("at_once")
 def test_a_run_that_is_ended_while_it_waits_leaves_nothing_with_the_scheduler() -> None:
     def interrupt(text: str) -> None:
         raise KeyboardInterrupt
@@ -174,6 +227,35 @@ def test_no_log_is_to_blame_for_a_scheduler_that_is_gone(looks: list[int | str])
     with pytest.raises(LinkError, match="scheduler must go on; instead it is gone"):
         results.extend(run(client, range(3), double, lost, watch))
     assert not results
+
+
+class Deadly(Client):
+    """A worker that takes up what it has in hand once nothing more comes, and dies of a piece."""
+
+    def __init__(self) -> None:
+        super().__init__([])
+        self._still = False
+
+    def submit(self, work: Callable[..., int], *given: object, pure: bool) -> Future:
+        self._still = False
+        return super().submit(work, *given, pure=pure)
+
+    def nthreads(self) -> dict[str, int]:
+        if self._still:
+            died = any(each.result(0.0) == double(3) for each in self._work)
+            for each in self._work:
+                each.end("error" if died else "finished")
+            self._work.clear()
+        self._still = bool(self._work)
+        return {"one": 1}
+
+
+@pytest.mark.usefixtures("at_once")
+def test_what_a_worker_had_in_hand_as_it_died_of_another_is_not_lost() -> None:
+    results = list(run(Deadly(), range(6), double, lost, SILENT))
+    killed = (3, "its worker must live; instead every one that tried it died")
+    assert [each for each in results if isinstance(each, tuple)] == [killed]
+    assert sorted(each for each in results if isinstance(each, int)) == [0, 2, 4, 8, 10]
 
 
 @pytest.mark.slow

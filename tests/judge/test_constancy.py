@@ -12,7 +12,7 @@ from magcomp.fit import fit
 from magcomp.judge import Thresholds, whole
 from magcomp.judge.constancy import Departure, departures_of
 from magcomp.judge.judge import judge
-from magcomp.model import Grade, Recording, Series
+from magcomp.model import Grade, ParameterChange, ParameterHistory, Recording, Series
 
 FLOWN = Flown(seed=3, seconds=240.0, tilt=0.25)
 HALF_S = 120.0
@@ -80,6 +80,24 @@ def test_a_step_keeps_a_fit_from_being_good_and_is_named(sound):
     verdict = judge(problem, fit(problem, "flight"))[1]
     assert verdict.grade is not Grade.GOOD
     assert "payload" in verdict.reasons[0]
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "told"),
+    [("COMPASS_DIA_X", 1.06, True), ("COMPASS_OFS_X", 60.0, True), ("COMPASS_OFS_X", 6.0, False)],
+)
+def test_two_aircraft_in_one_log_are_told_by_the_calibration_that_changes(sound, name, value, told):
+    history = sound.parameters
+    later = ParameterChange(HALF_S, name, history.last(name, 0.0) + value)
+    late = sound.field[1].time > HALF_S
+    another = replace(
+        changed(sound, np.multiply.outer(late, [35.0, 20.0, 0.0])),
+        parameters=ParameterHistory((*history.changes, later), history.whole),
+    )
+    problem = problem_of(another)
+    reason = judge(problem, fit(problem, "flight"))[1].reasons[0]
+    assert ("another aircraft" in reason) is told
+    assert " changed by " in reason
 
 
 def test_a_complaint_about_a_sensor_rejects(sound):

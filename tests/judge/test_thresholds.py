@@ -153,14 +153,24 @@ def test_the_calibration_in_force_is_judged_by_its_error_and_its_bound(before, p
 
 
 @pytest.mark.parametrize(
-    ("degrees", "std", "expected"),
-    [(0.9, 0.1, GOOD), (1.1, 0.1, MARGINAL), (1.1, 0.4, GOOD), (6.1, 0.1, REJECTED)],
+    ("kind", "degrees", "std", "expected"),
+    [
+        ("curve", 0.9, 0.1, GOOD),
+        ("curve", 1.1, 0.1, MARGINAL),
+        ("curve", 6.1, 0.1, REJECTED),
+        ("curve", 1.7, 0.55, MARGINAL),
+        ("curve", 1.7, 0.58, GOOD),
+        ("motors", 1.7, 0.47, MARGINAL),
+        ("motors", 1.7, 0.5, GOOD),
+    ],
 )
-def test_a_plain_departure_from_the_model_is_told(monkeypatch, degrees, std, expected):
-    departure = Departure("curve", degrees, std, 5.0, float("nan"), 1.0)
+def test_a_plain_departure_from_the_model_is_told(monkeypatch, kind, degrees, std, expected):
+    departure = Departure(kind, degrees, std, 5.0, float("nan"), 1.0)
     monkeypatch.setattr(whole, "departures_of", lambda *_: (departure,))
     monkeypatch.setattr(whole, "used_lags", lambda _: None)
-    problem = SimpleNamespace(control=SimpleNamespace(kind=CURRENT))
+    problem = SimpleNamespace(
+        control=SimpleNamespace(kind=CURRENT), readings=SimpleNamespace(stretch=np.zeros(9))
+    )
     assert grade(whole.on_constancy(problem, fit(), LIMITS, 1.0)) is expected
     assert grade(whole.on_constancy(problem, fit("sweep"), LIMITS, 1.0)) is GOOD
 
@@ -183,7 +193,9 @@ def test_two_levels_do_not_show_that_the_shift_is_straight(
     departure = Departure("curve", bend_deg / 2, bend_deg / 4, 5.0, float("nan"), 1.0)
     monkeypatch.setattr(whole, "departures_of", lambda *_: (departure,))
     monkeypatch.setattr(whole, "used_lags", lambda _: None)
-    problem = SimpleNamespace(control=SimpleNamespace(kind=CURRENT))
+    problem = SimpleNamespace(
+        control=SimpleNamespace(kind=CURRENT), readings=SimpleNamespace(stretch=np.zeros(9))
+    )
     of = fit(
         "levels",
         levels=tuple(SimpleNamespace(u=u) for u in held),

@@ -100,3 +100,19 @@ def test_an_encoding_gets_what_it_has(encoding: str, said: str) -> None:
 @given(st.text(), st.sampled_from(["ascii", "latin-1", "cp437", "cp1252", "utf-8"]))
 def test_what_is_encodable_can_be_encoded(text: str, encoding: str) -> None:
     encodable(text, encoding).encode(encoding)
+
+
+@pytest.mark.parametrize(
+    ("autopilot", "file", "loader"),
+    [
+        ("ardupilot", "compass.param", "your ground station (MAVProxy: param load)"),
+        ("px4", "compass.params", "QGroundControl (Parameters, Tools, Load from file)"),
+    ],
+)
+def test_the_file_is_one_that_the_vehicles_ground_station_loads(autopilot, file, loader) -> None:
+    found = still().analysis
+    analysis = replace(found, vehicle=replace(found.vehicle, autopilot=autopilot))
+    before = " ".join(as_text.analysis_text(analysis, {}, {}, Look(100)).split())
+    after = " ".join(as_text.analysis_text(analysis, {}, {}, Look(100), written=file).split())
+    assert f"-o {file} " in before
+    assert f"Written to {file}. Load it with {loader}" in after

@@ -16,6 +16,7 @@ from pyulog import ULog
 from ulog_writer import (
     ESC_REPORT_OF_FUNCTIONS,
     FORMS,
+    MAGIC,
     START_US,
     SYNC,
     Writer,
@@ -291,6 +292,13 @@ def test_what_was_said_before_the_log_does_not_move_its_beginning(recorded) -> N
     found = recorded(writer)
     assert found.duration_s == pytest.approx(1.9)
     assert found.field[1].time[0] == 0.0
+
+
+def test_a_log_that_does_not_say_when_it_began_begins_with_its_messages(recorded) -> None:
+    began = len(MAGIC)
+    data = short_flight(2).binary()
+    found = recorded(data[:began] + bytes(8) + data[began + 8 :])
+    assert found.duration_s == pytest.approx(1.9)
 
 
 @pytest.mark.parametrize("path", [*RECORDINGS, *REAL], ids=lambda path: path.stem)
