@@ -28,7 +28,8 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
-from magcomp.autopilots.px4_names import vector_names
+import numpy as np
+
 from magcomp.link.identity import read_heartbeat
 from magcomp.mavlink.version import unique_id
 from magcomp.model import ParameterSet, compasses_of
@@ -158,25 +159,23 @@ class Watched:
 
 def held(vehicle: Vehicle, firmware: Firmware) -> Held:
     """What the vehicle holds."""
-    return {name: vehicle.parameters[name] for name in (*firmware.names, firmware.switch)}
+    values = vehicle.parameters
+    return {name: values[name] for name in (*firmware.names, firmware.switch)}
 
 
 def in_force(vehicle: Vehicle, firmware: Firmware) -> Held:
     """What acts on its readings, as the values that would make it so."""
     if not isinstance(vehicle.firmware, Px4):
         return held(vehicle, firmware)
-    found: Held = {}
-    for slot, device in enumerate(sensors.DEVICE_IDS):
-        acting = vehicle.firmware.compasses.in_force(device)
-        found[firmware.switch] = float(acting.compensation)
-        for kind, vector in (
-            ("COMP", acting.motor),
-            ("OFF", acting.offset),
-            ("SCALE", acting.scale),
-            ("ODIAG", acting.off_diagonal),
-        ):
-            found |= dict(zip(vector_names(kind, slot + 1), vector.tolist(), strict=True))
-    return {name: found[name] for name in (*firmware.names, firmware.switch)}
+    acting = [vehicle.firmware.compasses.in_force(device) for device in sensors.DEVICE_IDS]
+    vectors = [
+        vector
+        for each in acting
+        for vector in (each.motor, each.offset, each.scale, each.off_diagonal)
+    ]
+    # In the order of its names, see PX4.
+    found = dict(zip(firmware.names, np.concatenate(vectors).tolist(), strict=True))
+    return found | {firmware.switch: float(acting[-1].compensation)}
 
 
 class Case:

@@ -39,6 +39,11 @@ SILENCE_S = 8.0
 _LEFT = "\x1b[?1049l"
 """Back to the screen from before the program, which is taken to have been empty."""
 
+_ADDRESS_ASKED = "Type an address such as"
+_FILE_OFFERED = r"┃ File +┃[^\n]*\n[^\n]*\.param +┃"
+_FILE_ASKED = r"┃ File +┃[^\n]*\n[^\n]{0,6}┃ +┃"
+"""A field that is there takes what is typed; before that, keys go astray."""
+
 _KEYBOARD = re.compile("\x1b\\[[<>=?][0-9;]*u")
 
 
@@ -83,6 +88,12 @@ class Terminal:
         for key in keys:
             os.write(self._ours, key.encode())
             self.look(0.3)
+
+    def type(self, text: str) -> None:
+        """Type a text into a field, and go on when all of it stands there; then press Enter."""
+        self.press(text)
+        self.until(re.escape(text), f"{text} in its field")
+        self.press("\r")
 
     def look(self, seconds: float) -> str:
         """What the screen shows after at most so long without anything new."""
@@ -186,7 +197,9 @@ def first_flight(terminal: Terminal, port: int, saved: Path, show: Show) -> None
         show(title, terminal)
 
     come("Start", r"Choose with the arrows", "what to choose")
-    terminal.press("a", f"udp:127.0.0.1:{port}", "\r")
+    terminal.press("a")
+    terminal.until(_ADDRESS_ASKED, "the cursor in the field for an address")
+    terminal.type(f"udp:127.0.0.1:{port}")
     come("Connected", r"Press N to record", "that the vehicle is found")
     terminal.press("n")
     come("Recording", r"at hover at most.*time 0[1-9]", "a bound at the hover")
@@ -196,8 +209,10 @@ def first_flight(terminal: Terminal, port: int, saved: Path, show: Show) -> None
     terminal.press("n")
     come("To be written", r"Press W to write", "what would change")
     terminal.press("s")
-    terminal.until(r"Save a parameter file", "the question for a file")
-    terminal.press("\x01", "\x0b", str(saved), "\r")
+    terminal.until(_FILE_OFFERED, "the question for a file")
+    terminal.press("\x01", "\x0b")
+    terminal.until(_FILE_ASKED, "an empty field")
+    terminal.type(str(saved))
     terminal.until(r"Saved to", "that the file is saved")
     terminal.press("w")
     come("Asked", r"Write \d+ parameters", "the question before it writes")

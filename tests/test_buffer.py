@@ -222,6 +222,17 @@ class TestBoundedMemory:
             tracemalloc.stop()
         assert held < 2 * self.LIMIT
 
+    def test_a_flood_of_texts_crowds_no_parameter_out(self):
+        buffer = Buffer("x", limit=self.LIMIT)
+        flight = Flight(buffer)
+        flight.fly(1)
+        flight.parameter("COMPASS_MOT_X", 1.5, 0.0)
+        for number in range(9000):
+            text = mavlink.MAVLink_statustext_message(6, f"text {number}".encode())
+            flight.say(text, number * 0.05)
+        flight.say(flight.vehicle.heartbeat(), 450.0)
+        assert buffer.snapshot().parameters.last("COMPASS_MOT_X", 0.0) == 1.5
+
     def test_a_clock_that_jumps_with_each_frame_makes_no_block_of_each(self):
         buffer, vehicle = Buffer("x", limit=self.LIMIT), FakeVehicle()
         for index in range(8000):

@@ -13,6 +13,7 @@ from magcomp.cli.linking import (
     ADDRESS_EPILOG,
     LinkOptions,
     StatusLine,
+    Warnings,
     address_argument,
     link_options,
     positive_seconds,
@@ -26,6 +27,7 @@ from magcomp.live.guide import pilot_is_done
 from magcomp.live.session import LiveSession
 from magcomp.live.situation import Manoeuvre
 from magcomp.live.snapshot import LiveSnapshot
+from magcomp.report import words
 
 _LOOK_S = 0.25
 _LEAST_CHANGE_S = 2.0
@@ -86,10 +88,9 @@ def _collect(session: LiveSession, timeout: float, limit: float) -> None:
             vehicle = session.connection.wait_vehicle(timeout)
         finally:
             status.clear()
-        compasses = len(vehicle.device_ids)
+        known = [compass.slot for compass in vehicle.compasses]
         status.say(
-            f"Found {vehicle.autopilot} {vehicle.kind} {vehicle.firmware}, system "
-            f"{vehicle.system}, {compasses} compass{'es' if compasses != 1 else ''}"
+            f"Found {words.vehicle(vehicle)}" + (f", {words.compasses(known)}" if known else "")
         )
         why = _Guide(session, status, stop, limit).run()
         session.stop_recording()
@@ -106,7 +107,7 @@ class _Guide:
         self._status = status
         self._stop = stop
         self._limit = limit
-        self._warned: set[str] = set()
+        self._warnings = Warnings(status)
         self._was_armed = False
         self._disarmed_at: float | None = None
         self._shown_at = -math.inf
@@ -116,7 +117,8 @@ class _Guide:
         begun = self._session.elapsed_s
         while not self._stop.wait(_LOOK_S):
             shown = self._session.snapshot()
-            self._warn(shown)
+            if shown.ready:
+                self._warnings.say(shown.warnings)
             self._show(shown)
             if shown.guidance.enough:
                 return f"Enough after {shown.elapsed_s - begun:.0f} s: the answer no longer changes"
@@ -127,12 +129,6 @@ class _Guide:
             if self._pilot_is_done(shown):
                 return f"Ended after {shown.elapsed_s - begun:.0f} s: the vehicle is disarmed"
         return f"Interrupted after {self._session.elapsed_s - begun:.0f} s: going on to the fit"
-
-    def _warn(self, shown: LiveSnapshot) -> None:
-        for warning in shown.warnings:
-            if shown.ready and warning not in self._warned:
-                self._warned.add(warning)
-                self._status.say(warning)
 
     def _show(self, shown: LiveSnapshot) -> None:
         # A line a change is only bearable where changes are rare.

@@ -8,7 +8,7 @@ import shutil
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TypedDict, TypeVar
@@ -276,6 +276,21 @@ class StatusLine:
         """Write a sentence that stays."""
         self.clear()
         complain(sentence)
+
+
+class Warnings:
+    """Says what a pilot should know of a live vehicle, each sentence once."""
+
+    def __init__(self, status: StatusLine) -> None:
+        self._status = status
+        self._said: set[str] = set()
+
+    def say(self, warnings: Iterable[str]) -> None:
+        """Say those that were not said before."""
+        for warning in warnings:
+            if warning not in self._said:
+                self._said.add(warning)
+                self._status.say(warning)
 
 
 def _columns() -> int:

@@ -34,8 +34,17 @@ def complain(message: str) -> None:
     if sentence and sentence[-1] not in ".!?:":
         sentence += "."
     line = f"{_ALONE}{_printable(alone)}" if alone else ""
-    whole = f"magcomp: {sentence}{line}\n"
+    whole = f"{_laid_out(f'magcomp: {sentence}')}{line}\n"
     _write(sys.stderr, in_words(whole) if takes_ascii_only(sys.stderr) else whole)
+
+
+def _laid_out(sentence: str) -> str:
+    """On a terminal no word goes on in the next line; elsewhere a sentence is one line."""
+    if sys.stderr is None or not sys.stderr.isatty():
+        return sentence
+    columns = shutil.get_terminal_size((_USUAL_COLUMNS, 24)).columns
+    lines = wrap(sentence, max(columns, 20), break_long_words=False, break_on_hyphens=False)
+    return "\n".join(lines)
 
 
 def _printable(text: str) -> str:

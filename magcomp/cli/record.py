@@ -11,6 +11,7 @@ from magcomp.cli.linking import (
     ADDRESS_EPILOG,
     LinkOptions,
     StatusLine,
+    Warnings,
     address_argument,
     link_options,
     positive_seconds,
@@ -18,7 +19,7 @@ from magcomp.cli.linking import (
     stop_on_interrupt,
 )
 from magcomp.cli.options import check_output
-from magcomp.cli.output import answer, complain
+from magcomp.cli.output import answer
 from magcomp.errors import ExitCode
 from magcomp.live.session import LiveSession
 from magcomp.live.snapshot import LiveSnapshot
@@ -50,6 +51,7 @@ def record(
     limit = positive_seconds(seconds) or math.inf
     check_output(output, (".tlog",), replayed(address), force=force)
     status = StatusLine()
+    warnings = Warnings(status)
     with (
         stop_on_interrupt() as stop,
         LiveSession.open(
@@ -66,13 +68,14 @@ def record(
             shown = session.snapshot()
             if not shown.recording:
                 break
+            if shown.ready:
+                warnings.say(shown.warnings)
             status.show(shown.link_text, _line(shown, session.elapsed_s - begun))
             stop.wait(_LOOK_S)
         status.clear()
         session.stop_recording()
         shown = session.snapshot()
-    for warning in shown.warnings:
-        complain(warning)
+    warnings.say(shown.warnings)
     answer(f"{output}: {summary(shown)}\n")
     if shown.recording_trouble:
         return ExitCode.USAGE

@@ -143,7 +143,9 @@ def _spin(session: LiveSession, bench: Bench, typed: str, status: StatusLine) ->
             case Stopping(why=why):
                 status.say(f"Stopping because {why}")
             case Outcome(done=done):
-                status.say(f"All motors were told to stand still after {len(done)} steps")
+                status.say(
+                    f"All motors were told to stand still after {words.counted(len(done), 'step')}"
+                )
 
     with stop_on_interrupt() as stop, any_key() as pressed:
         return carry_out_sweep(session, bench, typed, lambda: _wish(stop, pressed), tell)

@@ -22,7 +22,7 @@ from magcomp.cli.linking import (
 from magcomp.cli.options import check_output, json_option
 from magcomp.cli.output import answer, complain, look, progress
 from magcomp.cli.writing import agreed, carry_out, need_consent, say_what_acts, show_difference
-from magcomp.errors import ExitCode, InputError
+from magcomp.errors import ExitCode, MagcompError
 from magcomp.live.session import LiveSession
 from magcomp.live.upload import DISARM_S, new_file
 from magcomp.model import Analysis, Grade, ParameterSet, Recording
@@ -146,7 +146,7 @@ def _fit(session: LiveSession, options: Options, record_to: Path) -> tuple[Recor
         with progress() as step:
             recording = session.recording()
             analysis = session.analyse(options, lambda what, share: step(f"fitting {what}", share))
-    except InputError:
+    except MagcompError:
         complain(f"The recording is kept:\n  {record_to}")
         raise
     complain(f"Recording:\n  {record_to}")

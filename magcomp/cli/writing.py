@@ -15,6 +15,7 @@ from magcomp.cli.linking import StatusLine
 from magcomp.cli.output import answer, complain, look
 from magcomp.errors import ExitCode, LinkError, LinkTimeoutError, MagcompError, UsageError
 from magcomp.link import Connection
+from magcomp.report import words
 from magcomp.writing.events import (
     Event,
     Mismatch,
@@ -68,7 +69,7 @@ def show_difference(plan: WritePlan, *, to_stderr: bool = False, everything: boo
     """Print old → new of every parameter that changes, and what the pilot must know."""
     from rich.text import Text  # noqa: PLC0415
 
-    from magcomp.report import as_text, tables, words  # noqa: PLC0415 - rich only for people
+    from magcomp.report import as_text, tables  # noqa: PLC0415 - rich only for people
 
     changes = {change.name: change.new for change in plan.changes}
     parts: list[RenderableType] = [Text(f" {words.vehicle(plan.vehicle)}", style="bold")]
@@ -119,8 +120,7 @@ def agreed(count: int, *, yes: bool) -> bool:
     """Ask for consent, where it was not given beforehand."""
     if yes:
         return True
-    noun = "parameter" if count == 1 else "parameters"
-    return click.confirm(f"Write {count} {noun} to the vehicle?", err=True)
+    return click.confirm(f"Write {words.counted(count, 'parameter')} to the vehicle?", err=True)
 
 
 def carry_out(
@@ -170,7 +170,7 @@ def carry_out(
         complain_of(outcome, backup, reach)
         return ExitCode.INTERRUPTED
     raise_for_failure(outcome, backup, *reach)
-    complain(f"Written and read back: {len(plan.changes)} parameters")
+    complain(f"Written and read back: {words.counted(len(plan.changes), 'parameter')}")
     say_what_is_held(plan, after=True)
     return ExitCode.GOOD
 

@@ -84,5 +84,7 @@ def why_ambiguous(address: str, heartbeats: Sequence[Identity], *, twins: bool) 
             f"that they are system {heartbeats[0].system}. Give one of them another number or "
             "switch it off; where both are one vehicle, --system takes the one heard first."
         )
-    systems = " and ".join(f"{h.system} ({h.autopilot} {h.kind})" for h in heartbeats)
+    systems = " and ".join(
+        f"{h.system} ({autopilots.title(h.autopilot)} {h.kind})" for h in heartbeats
+    )
     return f"Several vehicles are on {address}, systems {systems}; choose one with --system."

@@ -11,7 +11,8 @@ from magcomp.model import Vehicle
 class VehicleFound:
     """The vehicle of this link is known; ``time`` in seconds of the link's clock.
 
-    Comes again when, after a gap or a reboot, another one answers in its place.
+    Comes again when more of it is learnt, as on a bad link, or when, after a gap or a reboot,
+    another one answers in its place.
     """
 
     time: float

@@ -8,6 +8,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from magcomp import autopilots
 from magcomp.link.framing import Message
+from magcomp.mavlink.commands import command_long
 from magcomp.mavlink.header import payload
 from magcomp.mavlink.heartbeat import Identity, identify
 from magcomp.mavlink.parameters import decode_param_value, encoding
@@ -17,6 +18,7 @@ from magcomp.model import Vehicle
 _BANNER = re.compile(r"\bV(\d+\.\d+\.\d+)")
 _RETRY_S = 0.4
 _TRIES = 8
+_MOST_TRIES = 40
 
 
 def read_heartbeat(message: Message) -> Identity | None:
@@ -30,7 +32,8 @@ class Identification:
     """Learns a vehicle's firmware, board and compasses, asking for what does not come by itself.
 
     Asking is PARAM_REQUEST_READ and MAV_CMD_REQUEST_MESSAGE only. ArduPilot does not
-    answer for parameters it does not have, so after eight tries the rest stays unknown.
+    answer for parameters it does not have, so after eight tries nobody waits for the rest; a link
+    that loses much may bring it later.
     """
 
     def __init__(self, heartbeat: Identity) -> None:
@@ -65,10 +68,9 @@ class Identification:
         )
 
     def complete(self, now: float) -> bool:
-        """Tell whether everything is known, or further asking is hopeless."""
-        if self._tries >= _TRIES and now >= self._next_try:
-            return True
-        return self._version_known and not self._missing_ids()
+        """Tell whether everything is known, or has been asked for often enough."""
+        asked_enough = self._tries >= _TRIES and now >= self._next_try
+        return self._is_all_known() or asked_enough or self._tries > _TRIES
 
     def heard(self, message: Message) -> None:
         """Learn from any message of the vehicle."""
@@ -88,7 +90,7 @@ class Identification:
 
     def due(self, now: float) -> list[Message]:
         """Questions to send now."""
-        if now < self._next_try or self._tries >= _TRIES or self.complete(now):
+        if now < self._next_try or self._tries >= _MOST_TRIES or self._is_all_known():
             return []
         self._tries += 1
         self._next_try = now + _RETRY_S
@@ -98,26 +100,18 @@ class Identification:
             for name in self._missing_ids()
         ]
         if not self._version_known:
-            questions.append(
-                command(
-                    to,
-                    mavlink.MAV_CMD_REQUEST_MESSAGE,
-                    mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
-                )
-            )
+            version = mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION
+            questions.append(command_long(to, mavlink.MAV_CMD_REQUEST_MESSAGE, version))
         return questions
+
+    def _is_all_known(self) -> bool:
+        return self._version_known and not self._missing_ids()
 
     def _known_names(self) -> tuple[str, ...]:
         return autopilots.named(self._heartbeat.autopilot).device_id_names
 
     def _missing_ids(self) -> list[str]:
         return [name for name in self._known_names() if name not in self._device_ids]
-
-
-def command(to: tuple[int, int], number: int, *parameters: float) -> Message:
-    """Make a COMMAND_LONG; parameters left out are 0."""
-    padded = (*parameters, *(0.0,) * (7 - len(parameters)))
-    return mavlink.MAVLink_command_long_message(*to, number, 0, *padded)
 
 
 def _whole(value: float) -> int:

@@ -33,7 +33,6 @@ class ReplayTransport:
         The file cannot be read, or holds no frame.
     """
 
-    answers = False
     peer: Peer = None
 
     def __init__(self, address: Replay, clock: Clock) -> None:

@@ -24,7 +24,6 @@ class SerialTransport:
         No such port, no permission, or another program has it.
     """
 
-    answers = True
     peer: Peer = None
 
     def __init__(self, address: SerialLine, clock: Clock) -> None:

@@ -27,7 +27,7 @@ from magcomp.link.framing import (
     GROUND_STATION_SYSTEM,
     Message,
 )
-from magcomp.link.identity import command
+from magcomp.mavlink.commands import command_long, every
 from magcomp.model import Vehicle
 
 DEFAULT_RATES: Mapping[str, float] = MappingProxyType(
@@ -286,14 +286,14 @@ class StreamControl:
                 self._fall_back()
 
     def _get(self, name: str) -> Message:
-        return command(self._to, mavlink.MAV_CMD_GET_MESSAGE_INTERVAL, _IDS[name])
+        return command_long(self._to, mavlink.MAV_CMD_GET_MESSAGE_INTERVAL, _IDS[name])
 
     def _set(self, name: str) -> Message:
         if self._restoring:
             interval = float(self._previous_us.get(name, 0))  # 0: the vehicle's default
         else:
             interval = 1e6 / self._wanted[name]
-        return command(self._to, mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, _IDS[name], interval)
+        return every(self._to, _IDS[name], interval)
 
     def _stream(self, name: str) -> Message:
         rate = self._previous_hz[name] if self._restoring else self._wanted[name]

@@ -23,7 +23,6 @@ class TcpTransport:
         Nothing listens there, the port is in use, or the host cannot be found.
     """
 
-    answers = True
     peer: Peer = None
 
     def __init__(self, address: TcpClient | TcpServer, clock: Clock) -> None:

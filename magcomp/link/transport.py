@@ -28,14 +28,11 @@ class Transport(Protocol):
     ----------
     clock
         Tells when the bytes last read arrived.
-    answers
-        Whether what is written can reach a vehicle (false for a replay).
     peer
         Who sent the bytes last read, where several can; None where only one can.
     """
 
     clock: Clock
-    answers: bool
     peer: Peer
 
     def read(self, timeout: float) -> bytes:

@@ -28,7 +28,6 @@ class UdpTransport:
         The port is in use, or the host cannot be found.
     """
 
-    answers = True
     peer: Peer = None
 
     def __init__(self, address: UdpServer | UdpClient, clock: Clock) -> None:

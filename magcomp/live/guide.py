@@ -119,19 +119,6 @@ class View:
     answered: bool = True
 
 
-__all__ = [
-    "Guidance",
-    "Situation",
-    "View",
-    "guide",
-    "is_settled",
-    "level_seconds",
-    "levels_done",
-    "pilot_is_done",
-    "wanted_heading",
-]
-
-
 def guide(view: View) -> Guidance:
     """Say what to do next.
 

@@ -51,6 +51,8 @@ class Now:
         The autopilot says that its compass is not healthy.
     accel
         Specific force in body axes, m/s², of the first IMU.
+    current_sensor
+        False where it says that it has none; None before it says anything of a battery.
     """
 
     stamp_us: int
@@ -65,6 +67,7 @@ class Now:
     speed: float | None
     compass_trouble: bool
     accel: Vector | None = None
+    current_sensor: bool | None = None
 
 
 class Latest:
@@ -165,6 +168,7 @@ class Latest:
             speed=None if hud is None else _finite(hud["groundspeed"]),
             compass_trouble=_compass_trouble(rows.get(Message.SYS_STATUS)),
             accel=_accel(rows),
+            current_sensor=_current_sensor(rows),
         )
 
 
@@ -189,6 +193,12 @@ def _current(rows: Mapping[int, Any]) -> float | None:
         if row is not None and row["current_battery"] >= 0:
             return float(row["current_battery"]) * 0.01
     return None
+
+
+def _current_sensor(rows: Mapping[int, Any]) -> bool | None:
+    if not {Message.BATTERY_STATUS, Message.SYS_STATUS} & rows.keys():
+        return None
+    return _current(rows) is not None
 
 
 def _voltage(rows: Mapping[int, Any]) -> float | None:

@@ -94,9 +94,12 @@ class Preparation:
     def _wait_for_vehicle(self, stop: threading.Event) -> Vehicle | None:
         while not stop.is_set() and not self._connection.ended:
             try:
-                return self._connection.wait_vehicle(1.0)
+                vehicle = self._connection.wait_vehicle(1.0)
             except LinkTimeoutError as error:
                 self.trouble = str(error)
+            else:
+                self.trouble = ""
+                return vehicle
         return None
 
     def _read(self, vehicle: Vehicle, names: tuple[str, ...]) -> None:

@@ -188,7 +188,9 @@ class Enough:
 
     def look(self, situation: Situation, guidance: Guidance) -> Guidance:
         """The guidance, with a share that is the largest so far."""
-        share = max(self._shares.get(situation, 0.0), guidance.share_done)
+        # Whoever stands on the ground records nothing: what there is stays as it was.
+        others = self._shares.values() if situation is Situation.GROUND else ()
+        share = max(self._shares.get(situation, 0.0), guidance.share_done, *others)
         self._shares[situation] = share
         if guidance.enough:
             self._over.add(situation)

@@ -16,7 +16,7 @@ from typing import Self, TypeVar
 
 from magcomp.analysis.analyse import Options, Progress, analyse
 from magcomp.buffer import Buffer
-from magcomp.errors import LinkError, LinkTimeoutError, MagcompError
+from magcomp.errors import InputError, LinkError, LinkTimeoutError, MagcompError
 from magcomp.link import (
     DEFAULT_RATES,
     GROUND_STATION_SYSTEM,
@@ -39,16 +39,9 @@ from magcomp.writing.events import Event, Outcome
 from magcomp.writing.files import is_own
 from magcomp.writing.in_force import in_force_sentence
 from magcomp.writing.plan import WritePlan
+from magcomp.writing.writer import ignore, never
 
 _Result = TypeVar("_Result")
-
-
-def _silent(_: object) -> None:
-    pass
-
-
-def _never() -> bool:
-    return False
 
 
 class LiveSession:
@@ -214,16 +207,6 @@ class LiveSession:
         return self._watch.snapshot()
 
     @property
-    def vehicle(self) -> Vehicle | None:
-        """The vehicle as far as known."""
-        return self.connection.vehicle
-
-    @property
-    def analysis(self) -> Analysis | None:
-        """The newest refit; None before the first."""
-        return self.refit.analysis
-
-    @property
     def refit(self) -> Refit:
         """How the refitting stands."""
         return Refit() if self._refitter is None else self._refitter.state
@@ -274,8 +257,15 @@ class LiveSession:
         ------
         InputError
             There is too little for a fit.
+        LinkError, LinkTimeoutError
+            There is too little, because the vehicle could not be asked.
         """
-        return analyse(self.recording(), options, progress)
+        try:
+            return analyse(self.recording(), options, progress)
+        except InputError as error:
+            if self._preparation.failure is not None:
+                raise self._preparation.failure from error
+            raise
 
     def listen(self, sink: FrameSink) -> None:
         """Give a sink every frame from now on, in the link's thread."""
@@ -298,7 +288,7 @@ class LiveSession:
     def upload_plan(
         self, wanted: ParameterSet, any_vehicle: bool = False, everything: bool = False
     ) -> WritePlan:
-        """Read the vehicle's calibration and compare; see ``session.upload.make_plan``."""
+        """Read the vehicle's calibration and compare; see ``magcomp.live.upload.make_plan``."""
         with self._asked:
             return make_plan(
                 self.connection,
@@ -323,8 +313,8 @@ class LiveSession:
         self,
         plan: WritePlan,
         backup_path: Path,
-        on_event: Callable[[Event], None] = _silent,
-        stop: Callable[[], bool] = _never,
+        on_event: Callable[[Event], None] = ignore,
+        stop: Callable[[], bool] = never,
     ) -> Outcome:
         """Write and verify a plan, or put everything back; nothing while armed.
 
@@ -354,8 +344,8 @@ class LiveSession:
         backup: Path,
         plan: WritePlan,
         backup_path: Path,
-        on_event: Callable[[Event], None] = _silent,
-        stop: Callable[[], bool] = _never,
+        on_event: Callable[[Event], None] = ignore,
+        stop: Callable[[], bool] = never,
     ) -> Outcome:
         """Write the plan that ``restore_plan(backup)`` made, and note it in the journal."""
         outcome = self.upload(plan, backup_path, on_event, stop)
@@ -366,10 +356,10 @@ class LiveSession:
     def wait_disarmed(
         self,
         seconds: float,
-        tell: Callable[[str], None] = _silent,
-        stop: Callable[[], bool] = _never,
+        tell: Callable[[str], None] = ignore,
+        stop: Callable[[], bool] = never,
     ) -> None:
-        """Wait until the vehicle is disarmed; see ``session.upload.wait_disarmed``."""
+        """Wait until the vehicle is disarmed; see ``magcomp.live.upload.wait_disarmed``."""
         wait_disarmed(lambda: self.armed, seconds=seconds, tell=tell, stop=stop)
 
     def close(self) -> None:

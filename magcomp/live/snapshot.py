@@ -23,6 +23,9 @@ from magcomp.model import Analysis, Grade, InForce, MotorFit, Series, Vehicle, q
 _PLAUSIBLE = (150.0, 900.0)
 """mGauss: the earth's field is 220 … 670; motors and a bad calibration add to it."""
 
+_TELLING_S = 3.0
+"""What has not come so long after it was asked for does not come."""
+
 _RATES_SETTLED_S = 8.0
 _FAST_HZ = 5.0
 _SLOW_SHARE = 0.6
@@ -257,13 +260,14 @@ def warnings(
     Parameters
     ----------
     streaming_s
-        Seconds since the streams were asked for; what has not come early on may still come.
+        Seconds since the streams were asked for; what has not come early on may still come. 0
+        where nothing could be asked for: then it is no wonder that something does not come.
     """
     autopilot = autopilots.of(vehicle)
     yield from autopilot.warnings(parameters)
     yield from autopilot.link_notes(len(vehicle.compasses))
     yield from _on_compasses(now, vehicle, parameters, streaming_s)
-    if streaming_s > 3.0 and now.current is None:
+    if now.current_sensor is False:
         yield "there is no current sensor: throttle is used, which changes with the battery"
     if (regressor := autopilot.regressor(parameters)) is not None:
         yield (
@@ -305,9 +309,9 @@ def _on_compasses(
     now: Now, vehicle: Vehicle, parameters: Mapping[str, float], streaming_s: float
 ) -> Iterator[str]:
     autopilot = autopilots.of(vehicle)
-    if streaming_s > 3.0 and not now.fields:
+    if streaming_s > _TELLING_S and not now.fields:
         yield f"no compass reports: {autopilot.no_compass_hint()}"
-    elif streaming_s > 3.0 and len(now.fields) < len(vehicle.device_ids):
+    elif streaming_s > _TELLING_S and len(now.fields) < len(vehicle.device_ids):
         missing = [n for n in range(1, len(vehicle.device_ids) + 1) if n not in now.fields]
         yield f"{_compasses(missing)} of {len(vehicle.device_ids)} does not report"
     if now.compass_trouble:

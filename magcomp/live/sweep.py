@@ -29,7 +29,7 @@ from magcomp.sweeping.messages import decode, encode
 from magcomp.sweeping.protocol import SweepSequence
 from magcomp.sweeping.steps import ENOUGH_EACH, GENTLE, TOLD_APART, require_possible
 from magcomp.writing.messages import Peer
-from magcomp.writing.writer import Connection
+from magcomp.writing.writer import Connection, ignore
 
 RATES: Mapping[str, float] = {**DEFAULT_RATES, "GLOBAL_POSITION_INT": 5.0}
 """Hz of what a sweep needs: a position is asked for often, because a change of it stops."""
@@ -51,10 +51,6 @@ class Session(Protocol):
     def alone(self, work: Callable[[Link, Vehicle, Latest, Clock], _Result]) -> _Result:
         """Let somebody speak with the vehicle while nobody else does."""
         ...
-
-
-def _silent(_: object) -> None:
-    pass
 
 
 @dataclass(frozen=True)
@@ -171,7 +167,7 @@ def sweep(
     bench: Bench,
     typed: str,
     pressed: Callable[[], Reason | None],
-    on_event: Callable[[Event], None] = _silent,
+    on_event: Callable[[Event], None] = ignore,
 ) -> Outcome:
     """Spin a vehicle's motors step by step; see :func:`carry_out`.
 
@@ -205,7 +201,7 @@ def carry_out(
     *,
     clock: Callable[[], float],
     pressed: Callable[[], Reason | None],
-    on_event: Callable[[Event], None] = _silent,
+    on_event: Callable[[Event], None] = ignore,
 ) -> Outcome:
     """Drive a machine until it has finished.
 
@@ -236,7 +232,7 @@ def carry_out(
         _drive(machine, connection, peer, clock, pressed, on_event)
     except BaseException:
         machine.stop(Reason.ERROR, clock())
-        _drive(machine, connection, peer, clock, lambda: None, _silent)
+        _drive(machine, connection, peer, clock, lambda: None, ignore)
         raise
     if machine.outcome is None:
         raise LinkError("A sweep must end with an outcome; instead there is none")

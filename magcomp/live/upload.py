@@ -22,7 +22,7 @@ from magcomp.writing.files import read_parameter_file
 from magcomp.writing.journal import JournalState, journal_path, mark_restored, read_journal
 from magcomp.writing.plan import WritePlan, plan
 from magcomp.writing.reader import ReadProgress
-from magcomp.writing.writer import read_current, write
+from magcomp.writing.writer import ignore, never, read_current, write
 
 DISARM_S = 300.0
 """How long a pilot gets to land and disarm."""
@@ -31,14 +31,6 @@ _FRESH_US = 1_500_000
 _LOOK_S = 0.1
 
 Tell = Callable[[Event], None]
-
-
-def _silent(_: object) -> None:
-    pass
-
-
-def _never() -> bool:
-    return False
 
 
 def default_directory() -> Path:
@@ -121,7 +113,7 @@ def make_plan(
     any_vehicle: bool = False,
     everything: bool = False,
     clock: Callable[[], float] = time.monotonic,
-    on_progress: Callable[[ReadProgress], None] = _silent,
+    on_progress: Callable[[ReadProgress], None] = ignore,
 ) -> WritePlan:
     """Read the vehicle's calibration and compare it with what is wanted; the options of ``plan``.
 
@@ -149,8 +141,8 @@ def wait_disarmed(
     seconds: float = DISARM_S,
     clock: Callable[[], float] = time.monotonic,
     rest: Callable[[float], None] = time.sleep,
-    tell: Callable[[str], None] = _silent,
-    stop: Callable[[], bool] = _never,
+    tell: Callable[[str], None] = ignore,
+    stop: Callable[[], bool] = never,
 ) -> None:
     """Wait until the vehicle says that it is disarmed.
 
@@ -199,8 +191,8 @@ def write_plan(
     backup: Path,
     clock: Callable[[], float] = time.monotonic,
     unix_us: Callable[[], int] = lambda: time.time_ns() // 1000,
-    on_event: Tell = _silent,
-    stop: Callable[[], bool] = _never,
+    on_event: Tell = ignore,
+    stop: Callable[[], bool] = never,
 ) -> Outcome:
     """Write and verify, or put everything back; see magcomp.writing.writer.write."""
     link = WriteLink(connection, latest, unix_us)

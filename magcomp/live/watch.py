@@ -21,7 +21,6 @@ from magcomp.link import (
     Replay,
     SinkFailed,
     StrangerHeard,
-    VehicleFound,
     VehicleRebooted,
 )
 from magcomp.link.clock import Clock
@@ -211,8 +210,6 @@ class Watch:
                 self._gap = (self._clock.monotonic(), f"the link was gone for {duration:.0f} s")
             case VehicleRebooted():
                 self._note("the vehicle rebooted")
-            case VehicleFound():
-                self._preparation.trouble = ""
             case StrangerHeard(where=where):
                 self._note(f"somebody else at {where} speaks in the vehicle's name; it is ignored")
             case SinkFailed(error=error):
@@ -252,14 +249,15 @@ class Watch:
             return self._preparation.trouble or "waiting for a heartbeat"
         if not up:
             return "the link is lost; trying again"
-        return self._preparation.trouble or "connected"
+        return "connected"
 
     def _warnings(
         self, now: Now, vehicle: Vehicle | None, parameters: Mapping[str, float]
     ) -> tuple[str, ...]:
         if vehicle is None:
             return ()
-        since = self._preparation.streaming_since
+        preparation = self._preparation
+        since = None if preparation.failure is not None else preparation.streaming_since
         streaming = 0.0 if since is None else self._clock.monotonic() - since
         asked, received = self._connection.requested_rates, self._connection.statistics().rates
         slow = next(slow_streams(asked, received, streaming), "")
@@ -273,8 +271,8 @@ class Watch:
         ended, gap = self._gap
         if self._clock.monotonic() - ended < _GAP_TOLD_S:
             found.append(gap)
-        if self._preparation.failure is not None:
-            found.insert(0, str(self._preparation.failure).rstrip("."))
+        if preparation.over.is_set() and preparation.trouble:
+            found.insert(0, preparation.trouble.rstrip("."))
         if self._tap.failure:
             found.insert(0, self._tap.failure.rstrip("."))
         return tuple(found)

@@ -23,7 +23,6 @@ class CarriedTransport:
         Tells when frames arrived.
     """
 
-    answers = True
     peer: Peer = None
 
     def __init__(self, send: Callable[[bytes], object], clock: Clock) -> None:

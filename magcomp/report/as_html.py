@@ -111,7 +111,7 @@ def _panel(
     return {
         "number": compass["compass"],
         "grade": compass["verdict"],
-        "reasons": compass["reasons"],
+        "reasons": plain.doubts(compass["reasons"], compass["verdict"]),
         "figures": {figure.name: figure for figure in pictures},
         "heading_errors": html_tables.heading_errors(numbers, index, quantity),
         "parameters": html_tables.parameters(numbers, index, present),

@@ -21,6 +21,8 @@ from magcomp.model import (
     CompassResult,
     Coverage,
     FieldResidual,
+    Grade,
+    HeadingError,
     Lags,
     Line,
     Recording,
@@ -67,6 +69,7 @@ def check_object(
                     {"u": row.u, "in_force": row.before, "p95": row.p95}
                     for row in verdict.heading_error
                 ],
+                "quoted": _quoted_in_force(verdict),
                 "field_residual_mgauss": {"in_force": verdict.residual.before},
                 "coverage": _coverage(verdict.coverage),
                 "verdict": verdict.grade.value,
@@ -141,7 +144,7 @@ def _compass(result: CompassResult) -> dict[str, Any]:
             {"u": row.u, "before": row.before, "after": row.after, "p95": row.p95}
             for row in verdict.heading_error
         ],
-        "quoted": quoted(verdict),
+        "quoted": quoted(result),
         "coverage": _coverage(verdict.coverage),
         "free": sorted(fit.free),
         "earth_mgauss": {"strength": fit.strength, "vertical": fit.vertical},
@@ -175,18 +178,17 @@ def _compass(result: CompassResult) -> dict[str, Any]:
     }
 
 
-def quoted(verdict: Verdict) -> dict[str, float | bool]:
+def quoted(result: CompassResult) -> dict[str, float | bool]:
     """The one row of the heading errors that every sentence and card quotes.
 
-    It is the hover's, or the highest control quantity's where only there something is gained.
+    It is the hover's, or the highest control quantity's where only there something is gained, or
+    where a vehicle that stood still cannot show what is gained.
     """
-    covered = verdict.coverage
-    middle = 0.5 * (covered.u_low + covered.u_high)
-    hover = covered.u_median if math.isfinite(covered.u_median) else middle
-    row, is_hover = error_at(verdict.heading_error, hover), True
+    verdict = result.verdict
+    row, is_hover = error_at(verdict.heading_error, _hover(verdict)), True
     if row.before <= row.p95:
-        top = error_at(verdict.heading_error, covered.u_high)
-        if top.before > top.p95:
+        top = error_at(verdict.heading_error, verdict.coverage.u_high)
+        if result.fit.method == "sweep" or top.before > top.p95:
             row, is_hover = top, False
     return {
         "u": row.u,
@@ -195,6 +197,39 @@ def quoted(verdict: Verdict) -> dict[str, float | bool]:
         "p95": row.p95,
         "hover": is_hover,
     }
+
+
+def quoted_row(quoted: Mapping[str, float]) -> HeadingError:
+    """The row that :func:`quoted` tells of."""
+    return HeadingError(*(quoted[name] for name in ("u", "before", "after", "p95")))
+
+
+def _hover(verdict: Verdict) -> float:
+    """The control quantity in use half of the time, or the middle of what was covered."""
+    covered = verdict.coverage
+    middle = 0.5 * (covered.u_low + covered.u_high)
+    return covered.u_median if math.isfinite(covered.u_median) else middle
+
+
+def _quoted_in_force(verdict: Verdict) -> dict[str, float | bool] | None:
+    """The row that is quoted of a calibration in force; None where there is no row at all.
+
+    It is the hover's, or the worst where only that is more than its doubt and the judge minds.
+    """
+    rows = verdict.heading_error
+    if not rows:
+        return None
+    row, is_hover = error_at(rows, _hover(verdict)), True
+    if verdict.grade is not Grade.GOOD and not _is_told(row):
+        worst = max(rows, key=lambda each: each.before)
+        if _is_told(worst):
+            row, is_hover = worst, False
+    return {"u": row.u, "in_force": row.before, "p95": row.p95, "hover": is_hover}
+
+
+def _is_told(row: HeadingError) -> bool:
+    """Whether an error in force is more than the doubt about it."""
+    return row.before > row.p95 - row.before
 
 
 def _lags(lags: Lags) -> dict[str, float]:

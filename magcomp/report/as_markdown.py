@@ -53,9 +53,11 @@ def _compass(compass: Mapping[str, Any], present: Mapping[str, float]) -> Iterat
     quantity = quantity_of(compass["regressor"])
     yield f"## Compass {compass['compass']}: {compass['verdict']}"
     yield ""
-    for reason in compass["reasons"]:
+    told = plain.doubts(compass["reasons"], compass["verdict"])
+    for reason in told:
         yield f"- {_plain(words.sentence(reason))}"
-    yield ""
+    if told:
+        yield ""
     yield from _table(
         [quantity.title, "in force (°)", "fit, expected (°)", "fit, 95 % bound (°)"],
         [

@@ -102,16 +102,12 @@ def check_text(
     asked
         The one compass that was asked for, if one was.
     """
+    document = as_json.check_object(recording, verdicts, kind)
     parts: list[RenderableType] = [
-        *_first_lines([plain.check_line(verdicts, kind)]),
+        *_first_lines([plain.check_line(document)]),
         *_whose(recording.source, recording.vehicle, recording.duration_s),
     ]
-    results = [
-        verdicts_text.Finding(compass, verdict, kind)
-        for compass, verdict in sorted(verdicts.items())
-    ]
-    columns = ("in force", "at most (95 %)")
-    parts.extend(verdicts_text.of_findings(results, columns, ("red", "yellow")))
+    parts.extend(verdicts_text.of_check(verdicts, document))
     parts.append(Text())
     parts.append(tables.check(verdicts, kind))
     if left_out := on_lift_alone(recording)[1]:

@@ -88,7 +88,8 @@ def _plain_sign(sign: str) -> str:
 def in_words(text: str) -> str:
     """A text for people in ASCII: what one sign cannot say is said in several.
 
-    The gap before what has grown makes room for it, so that columns stay under each other.
+    The gap before what has grown makes room for it, so that columns stay under each other; what a
+    line begins with is no gap.
 
     Examples
     --------
@@ -96,6 +97,8 @@ def in_words(text: str) -> str:
     'at most 0.9 deg'
     >>> in_words("   0 A       17.0°  ██")
     '   0 A    17.0 deg  ##'
+    >>> in_words("   wrong by 12.8°")
+    '   wrong by 12.8 deg'
     """
     return text if text.isascii() else "\n".join(map(_line_in_words, text.split("\n")))
 
@@ -104,7 +107,7 @@ def _line_in_words(line: str) -> str:
     made: list[str] = []
     for part in _GAP.split(line):
         said = "".join(_IN_WORDS.get(sign) or plain(sign) for sign in part)
-        if made and made[-1].isspace() and len(said) > len(part):
+        if any(made[:-1]) and made[-1].isspace() and len(said) > len(part):
             gap = made.pop()
             made.append(" " * max(len(gap) - len(said) + len(part), 1))
         made.append(said)

@@ -140,7 +140,7 @@ def compass_plots(
     """
     fit = result.fit
     samples, present, in_force = _samples(recording, fit, start, end)
-    quoted = np.array([as_json.quoted(result.verdict)["u"]])
+    quoted = np.array([as_json.quoted(result)["u"]])
     multiplied = multiplied_in_force(quoted, present.regressor, fit, in_force, samples)
     corrected = fit.correction.apply(samples.raw, samples.u)
     parts, before, after = _unexplained(fit, samples, corrected)

@@ -68,7 +68,7 @@ def _area(time: list[float], load: FloatArray, name: str, colour: str) -> Trace:
 
 def missions(result: CompassResult, plots: CompassPlots, quantity: Quantity) -> Figure:
     """A mission of 50 m legs with the compass as it is, and as wrong as the fit may leave it."""
-    quoted = as_json.quoted(result.verdict)
+    quoted = as_json.quoted(result)
     now = mission(plots.level_errors)
     fitted = mission(np.full_like(plots.level_errors, np.radians(quoted["p95"])))
     data = [

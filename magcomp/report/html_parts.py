@@ -79,8 +79,7 @@ class Numbers:
         shown = value * scale
         words_ = words.parameter(shown) if decimals is None else f"{shown:.{decimals}f}"
         scaled = "" if scale == 1.0 else f"{scale:g}"
-        made: Markup = _macros().number(repr(value), ".".join(map(str, key)), scaled, minus(words_))
-        return made
+        return part("number", repr(value), ".".join(map(str, key)), scaled, minus(words_))
 
 
 def minus(text: str) -> str:
@@ -97,27 +96,29 @@ def with_code(words_: str) -> Markup:
     return Markup("").join(parts)
 
 
+def part(name: str, *given: Any) -> Markup:
+    """What a macro of ``parts.html.j2`` makes of what it is given."""
+    made: Markup = getattr(_macros(), name)(*given)
+    return made
+
+
 def table(
     head: Sequence[str], rows: Iterable[Sequence[str]], caption: str, kind: str = ""
 ) -> Markup:
     """A table; the first cell of a row is its head."""
-    made: Markup = _macros().table(head, [tuple(row) for row in rows], caption, kind)
-    return made
+    return part("table", head, [tuple(row) for row in rows], caption, kind)
 
 
 def facts(pairs: Iterable[tuple[str, str]], whole: str = "") -> Markup:
     """Names and values; the one named ``whole`` has a row of its own."""
-    made: Markup = _macros().facts(list(pairs), whole)
-    return made
+    return part("facts", list(pairs), whole)
 
 
 def badge(grade: str) -> Markup:
     """A grade as sign and word."""
-    made: Markup = _macros().badge(grade)
-    return made
+    return part("badge", grade)
 
 
 def sign(grade: str) -> Markup:
     """A grade as a sign whose shape alone tells it."""
-    made: Markup = _macros().sign(grade)
-    return made
+    return part("sign", grade)

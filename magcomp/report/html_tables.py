@@ -13,7 +13,7 @@ from magcomp.model import Recording
 from magcomp.report import plain, words
 from magcomp.report.evidence import CompassPlots
 from magcomp.report.figure import Quantity, quantity_of
-from magcomp.report.html_parts import DASH, Key, Numbers, facts, minus, table
+from magcomp.report.html_parts import DASH, Key, Numbers, facts, minus, part, table
 
 _MOST_DECIMALS = 4
 
@@ -49,10 +49,12 @@ def _unit(quantity: Quantity) -> str:
 def heading_errors(numbers: Numbers, index: int, quantity: Quantity) -> str:
     """Heading error by control quantity."""
     compass = numbers.at("compasses", index)
-    places: list[Key] = [("heading_error_deg", k) for k in range(len(compass["heading_error_deg"]))]
-    if all(row["u"] != compass["quoted"]["u"] for row in compass["heading_error_deg"]):
-        places.append(("quoted",))
-    keys: list[Key] = [("compasses", index, *place) for place in places]
+    places: list[Key] = [
+        ("heading_error_deg", k)
+        for k, row in enumerate(compass["heading_error_deg"])
+        if not plain.reads_as_quoted(row, compass)
+    ]
+    keys: list[Key] = [("compasses", index, *place) for place in (*places, ("quoted",))]
     rows = [
         _heading_row(numbers, key, compass["coverage"], quantity)
         for key in sorted(keys, key=lambda key: float(numbers.at(*key, "u")))
@@ -63,10 +65,7 @@ def heading_errors(numbers: Numbers, index: int, quantity: Quantity) -> str:
         "Largest heading error over a full turn, level and tilted 20°",
         "numbers",
     )
-    return Markup(
-        '<div>{}<p class="note">In brackets: reckoned, not flown. Bold: the row quoted above. ≤: '
-        "what is in force is known no better than that.</p></div>"
-    ).format(errors)
+    return part("heading_errors", errors)
 
 
 def _heading_row(
@@ -82,7 +81,7 @@ def _heading_row(
         now = "≤\N{NO-BREAK SPACE}" + numbers.show(*key, "p95", decimals=1)
     cells = [u, *(cell + "°" for cell in (now, after, bound))]
     if key[-1] == "quoted":
-        return [Markup("<strong>{}</strong>").format(cell) for cell in cells]
+        return [part("strong", cell) for cell in cells]
     return cells
 
 
@@ -93,24 +92,12 @@ def parameters(numbers: Numbers, index: int, present: Mapping[str, float]) -> st
     for name, value in numbers.at(*key).items():
         old = present.get(name)
         shown = minus(words.parameter(old)) if old is not None else "not in the log"
-        row = [Markup("<code>{}</code>").format(name), shown, numbers.show(*key, name)]
+        row = (part("code", name), shown, numbers.show(*key, name))
         if old is not None and old == value:
             same.append(row)
         else:
             changed.append(row)
-    head = ["Parameter", "In the log", "New"]
-    if not changed and not same:
-        return Markup("<p>Nothing would be written for this compass.</p>")
-    page = (
-        table(head, changed, "Parameters that change", "numbers parameters")
-        if changed
-        else Markup("<p>The vehicle holds these values already.</p>")
-    )
-    if same:
-        page += Markup(
-            "<details><summary>{} parameters stay as they are</summary>{}</details>"
-        ).format(len(same), table(head, same, "Parameters that stay", "numbers parameters"))
-    return page
+    return part("parameters", ("Parameter", "In the log", "New"), changed, same)
 
 
 def findings(numbers: Numbers, index: int, quantity: Quantity) -> str:
@@ -153,7 +140,7 @@ def _axis(numbers: Numbers, index: int, axis: int) -> str:
         numbers.show("compasses", index, name, axis, decimals=decimals)
         for name in ("interference_mgauss", "std_mgauss")
     )
-    return Markup("<span>{} {} <small>± {}</small></span>").format(words.AXES[axis], value, doubt)
+    return part("axis", words.AXES[axis], value, doubt)
 
 
 def _lag(numbers: Numbers, index: int, which: str) -> str:
@@ -162,7 +149,7 @@ def _lag(numbers: Numbers, index: int, which: str) -> str:
     if value == DASH:
         return "not visible to this method"
     std = numbers.show(*key, "lag_std_s", which, decimals=0, scale=1000.0)
-    return Markup("{} ms <small>± {}</small>").format(value, std)
+    return part("with_aside", value + " ms", "± " + std)
 
 
 def _residual(numbers: Numbers, index: int, which: str) -> str:
@@ -173,10 +160,9 @@ def _straightness(numbers: Numbers, index: int) -> str:
     key = ("compasses", index, "line")
     if numbers.at(*key) is None:
         return DASH
-    return Markup("{} <small>({} mGauss off it)</small>").format(
-        numbers.show(*key, "straightness", decimals=4),
-        numbers.show(*key, "rms_mgauss", decimals=2),
-    )
+    off = numbers.show(*key, "rms_mgauss", decimals=2)
+    straightness = numbers.show(*key, "straightness", decimals=4)
+    return part("with_aside", straightness, "(" + off + " mGauss off it)")
 
 
 def coverage(numbers: Numbers, index: int, plots: CompassPlots, quantity: Quantity) -> str:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from magcomp.model import Grade, Verdict, quantity_of
+from magcomp.model import Grade, HeadingError, quantity_of
 from magcomp.report import words
 
 Document = Mapping[str, Any]
@@ -13,6 +14,9 @@ Document = Mapping[str, Any]
 WRITE, KEEP, REFUSE = "write", "keep", "refuse"
 
 _HOVERING = ("copter", "unknown")
+
+_SURELY = 2.0
+"""Standard errors beyond which a part is no accident (95 %)."""
 
 
 def pilots_lines(document: Document) -> tuple[str, ...]:
@@ -53,7 +57,9 @@ def answer_of(compass: Mapping[str, Any]) -> str:
     """:data:`WRITE`, :data:`KEEP` or :data:`REFUSE`, for one compass of the document."""
     if compass["verdict"] == Grade.REJECTED:
         return REFUSE
-    return KEEP if compass["kept"] or is_no_better(compass["quoted"]) else WRITE
+    if compass["kept"]:
+        return KEEP
+    return KEEP if is_no_better(compass["quoted"]) and not _takes_out(compass) else WRITE
 
 
 def is_no_better(row: Mapping[str, float]) -> bool:
@@ -61,33 +67,60 @@ def is_no_better(row: Mapping[str, float]) -> bool:
     return row["before"] <= row["p95"]
 
 
+def _takes_out(compass: Mapping[str, Any]) -> bool:
+    """Whether the motors' part is known of a vehicle that stood still.
+
+    There the bound is mostly of the calibration, which is as doubtful before as after.
+    """
+    part, doubt = compass["interference_mgauss"], compass["std_mgauss"]
+    return compass["method"] == "sweep" and math.hypot(*part) > _SURELY * math.hypot(*doubt)
+
+
+def reads_as_quoted(row: Mapping[str, Any], compass: Mapping[str, Any]) -> bool:
+    """Whether a row's control quantity is written as that of the row that is quoted."""
+    by, quoted = compass["regressor"], compass["quoted"]
+    return words.quantity(row["u"], by) == words.quantity(quoted["u"], by)
+
+
+def with_quoted(
+    table: Sequence[HeadingError], quoted: HeadingError, regressor: str
+) -> list[HeadingError]:
+    """A table with the quoted row in its place, instead of one that is written alike."""
+    own = words.quantity(quoted.u, regressor)
+    others = [row for row in table if words.quantity(row.u, regressor) != own]
+    return sorted([*others, quoted], key=lambda row: row.u)
+
+
 def table_rows(compass: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     """The heading errors of one compass of the document, with the row that is quoted among them."""
-    quoted = compass["quoted"]
-    rows = [row for row in compass["heading_error_deg"] if row["u"] != quoted["u"]]
-    return sorted([*rows, quoted], key=lambda row: float(row["u"]))
+    rows = [row for row in compass["heading_error_deg"] if not reads_as_quoted(row, compass)]
+    return sorted([*rows, compass["quoted"]], key=lambda row: float(row["u"]))
 
 
-def check_line(verdicts: Mapping[int, Verdict], regressor: str) -> str:
-    """The same for the calibration that a log was flown with."""
-    judged = [verdict for verdict in verdicts.values() if verdict.heading_error]
+def check_line(document: Document) -> str:
+    """The same for the calibration that a log was flown with.
+
+    Parameters
+    ----------
+    document
+        From :func:`magcomp.report.as_json.check_object`.
+    """
+    compasses = document["compasses"]
+    judged = [compass for compass in compasses if compass["quoted"] is not None]
     if not judged:
         return "This log is too short to say how wrong your compass is."
-    worst = max((row for verdict in judged for row in verdict.heading_error), key=_before)
-    where = words.quantity(worst.u, regressor)
-    who, verb = ("compasses", "are") if len(verdicts) > 1 else ("compass", "is")
-    if all(verdict.grade is Grade.GOOD for verdict in verdicts.values()):
-        leave = "Leave them as they are." if len(verdicts) > 1 else "Leave it as it is."
-        now, most = words.degrees(worst.before), words.degrees(worst.p95)
-        return f"Your {who} {verb} right: wrong by {now} at {where}, at most by {most}. {leave}"
-    return (
-        f"At {where} your {who} {verb} up to {words.degrees(worst.before)} wrong. "
-        "Fit this log: magcomp fit."
-    )
-
-
-def _before(row: Any) -> float:
-    return float(row.before)
+    worst = max(judged, key=lambda compass: float(compass["quoted"]["in_force"]))
+    row = worst["quoted"]
+    u = quantity_of(worst["regressor"]).in_sentence(row["u"])
+    where = f"{u}, the usual load," if row["hover"] else u
+    many = len(compasses) > 1
+    who, verb = ("compasses", "are") if many else ("compass", "is")
+    now = words.degrees(row["in_force"])
+    if all(compass["verdict"] == Grade.GOOD for compass in compasses):
+        leave = "Leave them as they are." if many else "Leave it as it is."
+        most = words.degrees(row["p95"])
+        return f"Your {who} {verb} right: at {where} wrong by {now}, at most by {most}. {leave}"
+    return f"At {where} your {who} {verb} up to {now} wrong. Fit this log: magcomp fit."
 
 
 def _where(document: Document, compass: Mapping[str, Any]) -> str:
@@ -107,8 +140,11 @@ def _write(document: Document, group: Sequence[Mapping[str, Any]], *, alone: boo
     verb = "are up to" if many else "is"
     doubt = any(compass["verdict"] == Grade.MARGINAL for compass in group)
     end = "Write them, with the doubt below in mind." if doubt else "Write them."
-    found = f"{where[:1].upper()}{where[1:]} {who} {verb} {now} wrong."
-    return f"{found} With these numbers: at most {bound}. {end}"
+    at = f"{where[:1].upper()}{where[1:]}"
+    if is_no_better(worst["quoted"]):
+        most = f"up to {now}" if many else now
+        return f"{at} your motors turn {who} by {most}. These numbers take that out. {end}"
+    return f"{at} {who} {verb} {now} wrong. With these numbers: at most {bound}. {end}"
 
 
 def _keep(document: Document, group: Sequence[Mapping[str, Any]], *, alone: bool) -> str:

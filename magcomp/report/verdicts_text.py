@@ -11,6 +11,7 @@ from rich.console import RenderableType
 from rich.padding import Padding
 from rich.text import Text
 
+from magcomp.judge.judge import error_at
 from magcomp.model import Analysis, Grade, HeadingError, Verdict
 from magcomp.report import as_json, plain, words
 from magcomp.report.bars import BEFORE_AFTER, Row, bars
@@ -38,6 +39,9 @@ class Finding:
         The row that the sentences quote.
     verbose
         Whether the judge's summary is told too.
+    compares
+        Whether the table is of what is in force and what comes after it, not of the former and
+        its bound.
     """
 
     compass: int
@@ -45,6 +49,7 @@ class Finding:
     regressor: str
     quoted: HeadingError | None = None
     verbose: bool = True
+    compares: bool = True
 
     @property
     def reasons(self) -> Sequence[str]:
@@ -59,14 +64,24 @@ def of_analysis(
     """Those of an analysis."""
     document = as_json.analysis_object(analysis) if document is None else document
     results = [
-        Finding(c.fit.compass, c.verdict, c.fit.regressor, _row_of(found["quoted"]), verbose)
+        Finding(
+            c.fit.compass, c.verdict, c.fit.regressor, as_json.quoted_row(found["quoted"]), verbose
+        )
         for c, found in zip(analysis.compasses, document["compasses"], strict=True)
     ]
     return of_findings(results, ("now", "corrected, at most (95 %)"), BEFORE_AFTER)
 
 
-def _row_of(quoted: Mapping[str, float]) -> HeadingError:
-    return HeadingError(*(quoted[name] for name in ("u", "before", "after", "p95")))
+def of_check(
+    verdicts: Mapping[int, Verdict], document: Mapping[str, Any]
+) -> Iterator[RenderableType]:
+    """Those of a check of the calibration in force."""
+    results = []
+    for found in document["compasses"]:
+        row, verdict = found["quoted"], verdicts[found["compass"]]
+        at = None if row is None else error_at(verdict.heading_error, row["u"])
+        results.append(Finding(found["compass"], verdict, found["regressor"], at, compares=False))
+    return of_findings(results, ("in force", "at most (95 %)"), ("red", "yellow"))
 
 
 def of_findings(
@@ -95,15 +110,13 @@ def _rows(finding: Finding) -> Iterator[Row]:
     quoted, covered = finding.quoted, finding.verdict.coverage
     table = list(finding.verdict.heading_error)
     if quoted is not None:
-        near = {words.quantity(quoted.u, finding.regressor)}
-        table = [row for row in table if words.quantity(row.u, finding.regressor) not in near]
-        table = sorted([*table, quoted], key=lambda row: row.u)
+        table = plain.with_quoted(table, quoted, finding.regressor)
     for row in table:
         u = words.quantity(row.u, finding.regressor)
         flown = words.is_flown(row.u, covered.u_low, covered.u_high)
         # What is in force is known no better than the fit is: below the fit's bound, its own
         # error is that bound, and the correction must not look worse.
-        bounded = quoted is not None and row.before <= row.p95
+        bounded = finding.compares and row.before <= row.p95
         yield Row(
             u if flown else f"({u})",
             (max(row.before, row.p95) if bounded else row.before, row.p95),

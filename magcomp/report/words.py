@@ -91,6 +91,17 @@ def duration(seconds: float) -> str:
     return f"{minutes // 60} h {minutes % 60} min"
 
 
+def counted(count: int, noun: str) -> str:
+    """``1 step`` or ``25 steps``.
+
+    Examples
+    --------
+    >>> counted(1, "step"), counted(25, "step")
+    ('1 step', '25 steps')
+    """
+    return f"{count} {noun}{'' if count == 1 else 's'}"
+
+
 def listed(items: Sequence[object]) -> str:
     """``1``, ``1 and 2``, ``1, 2 and 3``."""
     words = [str(item) for item in items]

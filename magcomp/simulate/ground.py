@@ -7,6 +7,8 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from magcomp.mavlink.commands import command_long, every
+
 GROUND_SYSTEM, GROUND_COMPONENT = 255, 190
 
 DEFAULT_RATES: Mapping[int, float] = {
@@ -76,10 +78,9 @@ class Asker:
 
     def command(self, number: int, *values: float) -> bytes:
         """COMMAND_LONG with its first parameters; the rest are 0."""
-        padded = (*values, *[0.0] * (7 - len(values)))
-        return self.pack(mavlink.MAVLink_command_long_message(self._target, 1, number, 0, *padded))
+        return self.pack(command_long((self._target, 1), number, *values))
 
     def rate(self, message: int, hertz: float) -> bytes:
         """SET_MESSAGE_INTERVAL; 0 Hz ends the stream."""
         interval = 1e6 / hertz if hertz > 0 else -1
-        return self.command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, message, interval)
+        return self.pack(every((self._target, 1), message, interval))

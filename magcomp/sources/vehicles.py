@@ -68,7 +68,9 @@ def choose(source: str, heartbeats: Frames, table: Table, choice: Choice) -> Ide
         raise _no_such_component(source, heard, choice.component)
     if choice.system is None and len(found) > 1:
         choices = " or ".join(f"--system {identity.system}" for identity in found)
-        described = ", ".join(f"{i.system} ({i.autopilot} {i.kind})" for i in found)
+        described = ", ".join(
+            f"{each.system} ({autopilots.title(each.autopilot)} {each.kind})" for each in found
+        )
         raise ChooseVehicleError(
             f"Log {source} must be read for one vehicle; instead received the systems "
             f"{described}: choose with {choices}."

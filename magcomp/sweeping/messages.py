@@ -10,6 +10,7 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from magcomp.autopilots.motor_test import Command
+from magcomp.mavlink.commands import command_long
 from magcomp.writing.messages import Heartbeat, Peer
 
 _ACCEPTED = int(mavlink.MAV_RESULT_ACCEPTED)
@@ -117,9 +118,7 @@ def decode(message: Any, peer: Peer) -> Incoming | None:
 
 def encode(command: Command, peer: Peer) -> mavlink.MAVLink_message:
     """Translate to a pymavlink message for the peer."""
-    return mavlink.MAVLink_command_long_message(
-        peer.system, peer.component, command.number, 0, *command.values
-    )
+    return command_long((peer.system, peer.component), command.number, *command.values)
 
 
 def _heartbeat(message: Any) -> Incoming:

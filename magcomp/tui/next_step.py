@@ -40,7 +40,7 @@ def explain(error: BaseException) -> tuple[str, str]:
     """One sentence for what happened, one for what to do next."""
     for kind, step in _STEPS:
         if isinstance(error, kind):
-            return words.sentence(str(error)), step
+            return _told(str(error)), step
     if isinstance(error, OSError):
         named = f"{error.filename}: " if error.filename else ""
         return words.sentence(f"{named}{error.strerror or error}"), "Check the file and the disk."
@@ -48,3 +48,11 @@ def explain(error: BaseException) -> tuple[str, str]:
         f"This should not have happened: {type(error).__name__}: {error}.",
         "Go on, or save what you have and start again; please report it.",
     )
+
+
+def _told(text: str) -> str:
+    """A sentence; a command that it ends with stands on a line of its own, as it is typed."""
+    said, _, command = text.partition("\n")
+    if not command:
+        return words.sentence(said)
+    return f"{said[:1].upper()}{words.printable(said[1:])}\n{words.printable(command.strip())}"

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from magcomp.model import CompassResult, FloatArray
-from magcomp.report import words
+from magcomp.report import as_json, words
 from magcomp.report.evidence import CompassPlots
-from magcomp.report.plain import is_no_better
+from magcomp.report.plain import is_no_better, with_quoted
 from magcomp.report.shift import Shift, shift_of
 
 AXIS_WORDS = ("forward", "right", "down")
@@ -30,6 +30,8 @@ class ErrorRow:
         Now, corrected, and corrected at most with 95 % probability.
     covered
         The recording was flown at this control quantity.
+    is_quoted
+        The sentences are of this row.
     """
 
     label: str
@@ -37,6 +39,7 @@ class ErrorRow:
     after: float
     bound: float
     covered: bool
+    is_quoted: bool = False
 
     @property
     def floor(self) -> float:
@@ -51,7 +54,8 @@ class ErrorRow:
 
 def error_rows(result: CompassResult) -> tuple[ErrorRow, ...]:
     """Heading error by control quantity, as the judge found it."""
-    covered = result.verdict.coverage
+    covered, quoted = result.verdict.coverage, as_json.quoted_row(as_json.quoted(result))
+    rows = with_quoted(result.verdict.heading_error, quoted, result.fit.regressor)
     return tuple(
         ErrorRow(
             words.quantity(row.u, result.fit.regressor),
@@ -59,8 +63,9 @@ def error_rows(result: CompassResult) -> tuple[ErrorRow, ...]:
             row.after,
             row.p95,
             words.is_flown(row.u, covered.u_low, covered.u_high),
+            is_quoted=row is quoted,
         )
-        for row in result.verdict.heading_error
+        for row in rows
     )
 
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
 
-from magcomp.model import Analysis, Verdict
+from magcomp.judge.judge import error_at
+from magcomp.model import Analysis, CompassResult, HeadingError, Verdict
 from magcomp.report import words
+from magcomp.report.as_json import quoted
 
 
 class Kept(StrEnum):
@@ -29,7 +31,7 @@ _MEANING = {
 
 @dataclass(frozen=True)
 class Promise:
-    """One compass, at the control quantity where least is left of the promise.
+    """One compass, at the control quantity that the fit's sentences quote.
 
     Attributes
     ----------
@@ -41,6 +43,8 @@ class Promise:
         Heading error at most (95 %), as the fit said, degrees.
     measured, doubt
         Heading error that the flight shows, and what it may be more or less (95 %), degrees.
+    elsewhere
+        The same at another control quantity where it is broken and here it is not; else None.
     """
 
     compass: int
@@ -49,6 +53,7 @@ class Promise:
     promised: float
     measured: float
     doubt: float
+    elsewhere: Promise | None = None
 
     @property
     def kept(self) -> Kept:
@@ -60,10 +65,17 @@ class Promise:
     @property
     def sentence(self) -> str:
         """``Compass 1 at 24 A: promised at most 0.4°, measured 0.3° ✓``."""
+        other = self.elsewhere
+        if other is None:
+            return f"Compass {self.compass} {self._found}{_MEANING[self.kept]}"
+        return f"Compass {self.compass} {self._found}, but {other._found}{_MEANING[other.kept]}"
+
+    @property
+    def _found(self) -> str:
         at = words.quantity(self.u, self.regressor)
         return (
-            f"Compass {self.compass} at {at}: promised at most {self.promised:.1f}°, measured "
-            f"{self.measured:.1f}° {self.kept}{_MEANING[self.kept]}"
+            f"at {at}: promised at most {self.promised:.1f}°, measured "
+            f"{self.measured:.1f}° {self.kept}"
         )
 
 
@@ -85,19 +97,24 @@ def promises(analysis: Analysis, verdicts: Mapping[int, Verdict]) -> tuple[Promi
     found = []
     for result in analysis.compasses:
         verdict = verdicts.get(result.fit.compass)
-        rows = result.verdict.heading_error
-        if verdict is None or not rows or not verdict.heading_error:
+        if verdict is None or not result.verdict.heading_error or not verdict.heading_error:
             continue
-        each = [
-            Promise(
-                result.fit.compass,
-                row.u,
-                result.fit.regressor,
-                float(np.interp(row.u, [r.u for r in rows], [r.p95 for r in rows])),
-                row.before,
-                row.p95 - row.before,
-            )
-            for row in verdict.heading_error
-        ]
-        found.append(max(each, key=lambda promise: promise.measured - promise.promised))
+        rows = verdict.heading_error
+        # Beyond what this flight was flown at it measures nothing.
+        u = float(np.clip(quoted(result)["u"], rows[0].u, rows[-1].u))
+        here = _promise(result, error_at(rows, u))
+        least = max((_promise(result, row) for row in rows), key=_broken_by)
+        broken = least.kept is Kept.NO and here.kept is not Kept.NO
+        found.append(replace(here, elsewhere=least if broken else None))
     return tuple(found)
+
+
+def _promise(result: CompassResult, measured: HeadingError) -> Promise:
+    promised = error_at(result.verdict.heading_error, measured.u).p95
+    doubt = measured.p95 - measured.before
+    fit = result.fit
+    return Promise(fit.compass, measured.u, fit.regressor, promised, measured.before, doubt)
+
+
+def _broken_by(promise: Promise) -> tuple[bool, float]:
+    return promise.kept is Kept.NO, promise.measured - promise.promised

@@ -32,7 +32,8 @@ class Busy:
     @property
     def sentence(self) -> str:
         """For the next line."""
-        return f"Wait: {self.what} … {100 * self.share:.0f} %"
+        share = f" … {100 * self.share:.0f} %" if self.share else ""
+        return f"Wait: {self.what}{share}"
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,6 +9,7 @@ from magcomp.analysis import Options
 from magcomp.errors import MagcompError
 from magcomp.live.sweep import Bench, raise_for_failure
 from magcomp.model import CURRENT
+from magcomp.report import words
 from magcomp.sweeping.events import Event, Outcome, Reason
 from magcomp.sweeping.steps import LEAST_MOST, MOST_MOST
 from magcomp.tui import fitting
@@ -114,5 +115,5 @@ def _end(app: BaseApp, swept: tuple[Outcome, float]) -> None:
     except MagcompError as error:
         app.complain(error)
         return
-    told = f"All motors were told to stand still after {len(outcome.done)} steps."
+    told = f"All motors were told to stand still after {words.counted(len(outcome.done), 'step')}."
     app.push_screen(Message("Stopped", told, "Press G to sweep anew; the recording goes on."))

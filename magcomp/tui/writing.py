@@ -185,8 +185,9 @@ def _confirm(app: BaseApp, plan: WritePlan) -> None:
         app.notify("The vehicle holds these values already: nothing is to be written.")
         return
     compasses = words.compasses(sorted(app.work.chosen))
+    count, vehicle = words.counted(len(rows), "parameter"), words.vehicle(plan.vehicle)
     lines = [
-        f"Write {len(rows)} parameters of {compasses} to {words.vehicle(plan.vehicle)}?",
+        f"Write {count} of {compasses} to {vehicle}?",
         f"The old values are saved first, in {backup}",
         *app.writing.warnings,
     ]
@@ -282,7 +283,7 @@ def ask_undo(app: BaseApp) -> None:
 
 
 def _confirm_undo(app: BaseApp, plan: WritePlan, backup: Path) -> None:
-    lines = f"Bring back {len(plan.changes)} parameters from the backup?\n{backup}"
+    lines = f"Bring back {words.counted(len(plan.changes), 'parameter')} from the backup?\n{backup}"
     dialog = Confirm("Undo?", lines, yes="Undo", no="Keep")
     app.push_screen(dialog, lambda sure: _undo(app, plan, backup) if sure else None)
 

@@ -84,7 +84,6 @@ class Exchange(Generic[Key]):
     def __init__(self, keys: Iterable[Key], timing: Timing) -> None:
         self._open: dict[Key, _Question] = {key: _Question() for key in keys}
         self._timing = timing
-        self._halted = False
         self.total = len(self._open)
         self._askings_of_answered = 0
 
@@ -110,24 +109,14 @@ class Exchange(Generic[Key]):
         needed = math.ceil(math.log(_MISTAKEN) / math.log(failure_rate))
         return min(needed, self._timing.attempts)
 
-    def halt(self) -> None:
-        """Ask nothing more; only what is under way may still be answered."""
-        self._halted = True
-
     def attempts(self, key: Key) -> int:
         """How often an open question has been asked."""
         return self._open[key].attempts
-
-    def idle(self, now: float) -> bool:
-        """Whether no answer is being waited for."""
-        return not any(self._waiting(question, now) for question in self._open.values())
 
     def ask(self, now: float) -> list[tuple[Key, int]]:
         """Questions to be sent now, each with how often it has been asked, this time included."""
         room = self._timing.window - sum(self._waiting(q, now) for q in self._open.values())
         asked: list[tuple[Key, int]] = []
-        if self._halted:
-            return asked
         for key, question in self._open.items():
             if len(asked) >= room:
                 break
@@ -158,7 +147,15 @@ class Exchange(Generic[Key]):
         return question.differing
 
     def unanswered(self, now: float, attempts: int | None = None) -> tuple[Key, ...]:
-        """Questions that stayed without answer as often as they are asked at all."""
+        """Questions that stayed without answer each time they were asked.
+
+        Parameters
+        ----------
+        now
+            The time, seconds.
+        attempts
+            So many times; as often as anything is asked at all unless given.
+        """
         limit = self._timing.attempts if attempts is None else attempts
         return tuple(
             key
@@ -175,7 +172,7 @@ class Exchange(Generic[Key]):
             not self._waiting(q, now) and q.attempts < self._timing.attempts
             for q in self._open.values()
         )
-        if askable and not self._halted and len(waiting) < self._timing.window:
+        if askable and len(waiting) < self._timing.window:
             return now
         return min(waiting, default=now)
 

@@ -56,8 +56,8 @@ class Fence:
             return []
         self._due = now + self._timing.retry_after
         self._asked += 1
-        token = max(self._tokens, default=0)
-        token = max(token + 1, round(now * 1e9))
+        # Nanoseconds, as everybody's; a clock that stands must not give one twice.
+        token = max(max(self._tokens, default=0) + 1, round(now * 1e9))
         self._tokens[token] = now
         while len(self._tokens) > _TOKENS:
             del self._tokens[next(iter(self._tokens))]

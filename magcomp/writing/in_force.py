@@ -6,13 +6,14 @@ send both the sensor's own field and what they make of it, so that at rest the t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from magcomp import autopilots
+from magcomp.mavlink.commands import every
 from magcomp.model import FloatArray, Series, Vehicle
 from magcomp.writing.plan import WritePlan
 from magcomp.writing.writer import Connection, fetch
@@ -85,27 +86,41 @@ def _sentence(
         (_apart(vehicle, seen, slot, now), _apart(vehicle, seen, slot, before))
         for slot in autopilots.of(vehicle).compass_messages(now)
     ]
-    new, old = min(apart, key=min)
-    if new <= _AGREES and old >= max(_TOLD_APART * new, _AGREES):
+    # The link does not tell which compass it uses: it may be any that fits what is seen.
+    may_be = [each for each in apart if min(each) <= _AGREES]
+    if not may_be:
+        new, old = min(apart, key=min)
         return (
-            f"{title} corrects its compass by what was written: within {new:.1f} mGauss; by what "
-            f"it held before it would be {old:.0f} off"
+            f"what {title} has in force cannot be seen: its compass is {new:.0f} mGauss from what "
+            f"was written and {old:.0f} from what was before, because its estimator takes off what "
+            "it has learned; restart the vehicle to be sure"
         )
-    if old <= _AGREES and new > max(_TOLD_APART * old, _AGREES):
+    from_new, from_old = zip(*may_be, strict=True)
+    if _is_first(from_new, from_old):
+        return (
+            f"{title} corrects its compass by what was written: within {max(from_new):.1f} mGauss; "
+            f"by what it held before it would be {min(from_old):.0f} off"
+        )
+    if _is_first(from_old, from_new):
         return (
             f"{title} still corrects its compass by what it held before: restart the vehicle, and "
             "it takes over what was written"
         )
-    if new <= _AGREES:
+    if max(from_new) <= _AGREES:
         return (
-            f"{title} corrects its compass as written, within {new:.1f} mGauss; without current "
-            "the new values make too little difference to be seen"
+            f"{title} corrects its compass as written, within {max(from_new):.1f} mGauss; without "
+            "current the new values make too little difference to be seen, or only in a compass "
+            "that it may not use"
         )
     return (
-        f"what {title} has in force cannot be seen: its compass is {new:.0f} mGauss from what was "
-        f"written and {old:.0f} from what was before, because its estimator takes off what it has "
-        "learned; restart the vehicle to be sure"
+        f"what {title} has in force cannot be seen: without current the new values make too little "
+        "difference, or only in a compass that it may not use; restart the vehicle to be sure"
     )
+
+
+def _is_first(these: Sequence[float], others: Sequence[float]) -> bool:
+    """Whether these explain what is seen and the others do not, whichever compass is used."""
+    return max(these) <= _AGREES and min(others) >= max(_TOLD_APART * max(these), _AGREES)
 
 
 def _apart(vehicle: Vehicle, seen: Seen, slot: int, values: Mapping[str, float]) -> float:
@@ -144,12 +159,6 @@ def _look(
 
 
 def _ask(connection: Connection, vehicle: Vehicle, names: list[str], interval_us: float) -> None:
-    to = (vehicle.system, vehicle.component)
     numbers = {each.msgname: number for number, each in mavlink.mavlink_map.items()}
     for name in names:
-        rest = [0.0] * 5
-        connection.send(
-            mavlink.MAVLink_command_long_message(
-                *to, mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, 0, numbers[name], interval_us, *rest
-            )
-        )
+        connection.send(every((vehicle.system, vehicle.component), numbers[name], interval_us))

@@ -49,11 +49,6 @@ class JournalState:
     outcome: Outcome | None = None
     restored: bool = False
 
-    @property
-    def needs_restore(self) -> bool:
-        """Whether the vehicle may hold something between old and new."""
-        return self.standing in {Standing.OFF, Standing.UNSURE}
-
 
 def journal_path(backup: Path) -> Path:
     """Where the journal of a backup lies."""

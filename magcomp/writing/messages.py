@@ -13,6 +13,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from magcomp.mavlink.commands import command_long
 from magcomp.mavlink.header import payload
 from magcomp.mavlink.heartbeat import is_armed
 from magcomp.mavlink.parameters import (
@@ -178,8 +179,8 @@ def encode(message: Outgoing, peer: Peer) -> mavlink.MAVLink_message:
         case Ping(token):
             return mavlink.MAVLink_timesync_message(0, token)
         case AskOwnNumber():
-            asked = (mavlink.MAV_CMD_REQUEST_MESSAGE, 0, mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
-            return mavlink.MAVLink_command_long_message(*to, *asked, 0, 0, 0, 0, 0, 0)
+            version = mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION
+            return command_long(to, mavlink.MAV_CMD_REQUEST_MESSAGE, version)
 
 
 def _param_value(message: Any, peer: Peer) -> Incoming:

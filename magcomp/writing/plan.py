@@ -300,7 +300,8 @@ def _stand_alike(wanted: Iterable[Compass], actual: Iterable[Compass]) -> bool:
 
 def _described(vehicle: Vehicle) -> str:
     return (
-        f"{vehicle.autopilot} system {vehicle.system} with compasses {_listed(vehicle.compasses)}"
+        f"{autopilots.title(vehicle.autopilot)} system {vehicle.system} "
+        f"with compasses {_listed(vehicle.compasses)}"
         + (f", {vehicle.board}" if vehicle.board else "")
         + (f" and flight controller {vehicle.uid}" if vehicle.uid else "")
     )

@@ -87,11 +87,12 @@ class Machine(Protocol[E_co]):
         ...
 
 
-def _ignore(_: object) -> None:
-    pass
+def ignore(_: object) -> None:
+    """Told what happens where nobody wants to know."""
 
 
-def _never() -> bool:
+def never() -> bool:
+    """Asked whether to stop where nobody may stop it."""
     return False
 
 
@@ -101,8 +102,8 @@ def run(
     peer: Peer,
     *,
     clock: Callable[[], float],
-    on_events: Callable[[Sequence[E]], None] = _ignore,
-    stop: Callable[[], bool] = _never,
+    on_events: Callable[[Sequence[E]], None] = ignore,
+    stop: Callable[[], bool] = never,
 ) -> None:
     """Drive a machine until it has finished; may be called again after an exception.
 
@@ -149,7 +150,7 @@ def fetch(
     names: Iterable[str] | None = None,
     *,
     clock: Callable[[], float],
-    on_event: Callable[[ReadProgress], None] = _ignore,
+    on_event: Callable[[ReadProgress], None] = ignore,
     timing: Timing | None = None,
 ) -> Mapping[str, float]:
     """Read all parameters of a vehicle, or those of `names` that it knows.
@@ -184,7 +185,7 @@ def read_current(
     *,
     everything: bool = False,
     clock: Callable[[], float],
-    on_event: Callable[[ReadProgress], None] = _ignore,
+    on_event: Callable[[ReadProgress], None] = ignore,
     timing: Timing | None = None,
 ) -> Mapping[str, float]:
     """Read what `plan` must know of a vehicle, by name; ``everything`` as there.
@@ -206,8 +207,8 @@ def write(
     *,
     backup: Path,
     clock: Callable[[], float],
-    on_event: Callable[[Event], None] = _ignore,
-    stop: Callable[[], bool] = _never,
+    on_event: Callable[[Event], None] = ignore,
+    stop: Callable[[], bool] = never,
     timing: Timing | None = None,
 ) -> Outcome:
     """Write a plan to the vehicle and verify it, or put everything back.

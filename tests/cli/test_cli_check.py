@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import itertools
 import json
+import re
 from pathlib import Path
-from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from logs_made_of_logs import FIXTURES, FLIGHT, SWEEP, frames
 from pymavlink.dialects.v20 import ardupilotmega as dialect
+from synthetic import Flown
 
 from magcomp.cli.app import run
-from magcomp.model import Grade, HeadingError
+from magcomp.model import Coverage, FieldResidual, Grade, HeadingError, Verdict
+from magcomp.report import as_json
 from magcomp.report.plain import check_line
 
 
@@ -63,9 +66,42 @@ def test_a_compass_of_which_too_little_is_there_does_not_keep_the_others_from_be
     assert "Compass 2 must have at least 60" in capsys.readouterr().err
 
 
+def checked(grade: Grade, *errors: tuple[float, float, float], hover: float) -> dict[str, Any]:
+    """The document of a check: load, error in force, at most."""
+    rows = tuple(HeadingError(u, before, before, p95) for u, before, p95 in errors)
+    covered = Coverage(0.3, 1.0, 20.0, 10.0, 40.0, 90.0, u_median=hover)
+    verdict = Verdict(grade, ("why",), rows, FieldResidual(9.0, 9.0, 9.0, 9.0), covered)
+    return as_json.check_object(Flown().recording(), {1: verdict}, "current")
+
+
 def test_the_first_line_tells_the_estimate_from_the_bound() -> None:
-    rows = (HeadingError(20.0, 0.4, 0.4, 1.8), HeadingError(30.0, 0.3, 0.3, 2.6))
-    good = SimpleNamespace(grade=Grade.GOOD, heading_error=rows)
-    assert check_line({1: good}, "current") == (
-        "Your compass is right: wrong by 0.4° at 20 A, at most by 1.8°. Leave it as it is."
+    document = checked(Grade.GOOD, (20.0, 0.4, 1.8), (30.0, 0.2, 2.6), hover=25.0)
+    assert check_line(document) == (
+        "Your compass is right: at 25 A, the usual load, wrong by 0.3°, at most by 2.2°. "
+        "Leave it as it is."
     )
+
+
+def test_what_is_wrong_is_told_of_the_load_in_use_half_of_the_time() -> None:
+    document = checked(Grade.REJECTED, (10.0, 4.0, 5.0), (40.0, 16.0, 18.0), hover=25.0)
+    assert check_line(document).startswith("At 25 A, the usual load, your compass is up to 10°")
+    assert document["compasses"][0]["quoted"] == {
+        "u": 25.0,
+        "in_force": 10.0,
+        "p95": 11.5,
+        "hover": True,
+    }
+
+
+def test_where_the_usual_load_shows_nothing_the_worst_says_why_it_is_rejected() -> None:
+    document = checked(Grade.REJECTED, (10.0, 0.1, 1.0), (40.0, 9.0, 10.0), hover=10.0)
+    assert check_line(document).startswith("At 40 A your compass is up to 9.0° wrong.")
+
+
+def test_the_row_that_is_quoted_stands_in_the_table(capsys: pytest.CaptureFixture[str]) -> None:
+    run(["check", str(FLIGHT), "--compass", "1"])
+    first, table = capsys.readouterr().out.split("heading error")
+    said = r"At (\d+ A), the usual load, your compass is up to ([\d.]+)° wrong"
+    load, wrong = re.findall(said, " ".join(first.split()))[0]
+    shown = dict(re.findall(r"(\d+ A) +([\d.]+)°", table))
+    assert round(float(shown[load])) == round(float(wrong))

@@ -91,6 +91,22 @@ def test_a_vehicle_that_listens_to_one_ground_station_says_how_to_be_that_one(ba
         assert run(["restore", str(backup), flown.address, *arguments]) == ExitCode.GOOD
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("command", ["record", "calibrate"])
+def test_a_vehicle_that_answers_nothing_is_not_told_to_enable_its_compass(
+    command, tmp_path, capsys
+):
+    strict = {"SYSID_ENFORCE": 1.0, "SYSID_MYGCS": 200.0}
+    file = ["-o" if command == "record" else "--record", str(tmp_path / "deaf.tlog")]
+    with alive(vehicle=landed(seed=4, parameters=strict)) as flown:
+        code = run([command, flown.address, "--system", "1", *file, "--seconds", "25"])
+    said = capsys.readouterr().err
+    assert code == (ExitCode.GOOD if command == "record" else ExitCode.TIMEOUT)
+    assert said.count("give that number with --source-system") == 1 + (command == "calibrate")
+    assert "COMPASS_ENABLE" not in said
+    assert "no current sensor" not in said
+
+
 def test_an_error_while_a_vehicle_is_written_says_what_the_vehicle_holds(
     backup, capsys, monkeypatch
 ):
@@ -114,6 +130,7 @@ def test_the_options_by_which_a_vehicle_is_reached_can_be_given_again(tmp_path):
     assert usual.options == ()
     key = tmp_path / "my key"
     other = LinkOptions(3, 2, 57600, bytes(32), 5.0, 200, key)
+    assert "key=" not in repr(other)  # what is logged of it never shows the key
     assert shlex.join(other.options) == (
         "--system 3 --component 2 --baud 57600 "
         f"--signing-key {shlex.quote(str(key))} --source-system 200"

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
+import sys
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from magcomp.cli.output import complain
 from magcomp.report import words
 from magcomp.report.as_json import dumps
 from magcomp.report.bars import BEFORE_AFTER, Row, bar, lines
@@ -95,3 +98,26 @@ def test_json_never_holds_what_is_no_number(value: object) -> None:
     text = dumps({"value": value, "array": np.array([math.nan, 1.0, math.inf])})
     assert text.isascii()
     assert json.loads(text, parse_constant=refuse)["array"] == [None, 1.0, None]
+
+
+class Terminal(io.StringIO):
+    """A stderr that somebody looks at."""
+
+    encoding = "utf-8"
+
+    def isatty(self) -> bool:
+        return True
+
+
+def test_on_a_terminal_a_sentence_breaks_between_words_and_a_path_does_not_break(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("COLUMNS", "60")
+    monkeypatch.setattr("sys.stderr", Terminal())
+    words = "take the propellers off, or hold the vehicle down so that it cannot move or tilt"
+    path = "/" + "long-folder/" * 8
+    complain(f"{words}\n  {path}")
+    *lines, last = sys.stderr.getvalue().splitlines()
+    assert max(map(len, lines)) <= 60
+    assert " ".join(lines) == f"magcomp: {words}."
+    assert last == f"  {path}"

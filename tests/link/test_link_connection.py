@@ -47,7 +47,6 @@ class Terminal:
     """The vehicle's end of a pseudo-terminal."""
 
     clock = CLOCK
-    answers = True
 
     def __init__(self) -> None:
         self._master, slave = pty.openpty()
@@ -159,6 +158,14 @@ def test_a_slow_serial_line_is_asked_for_no_more_than_it_carries(baud):
     whole = baud >= 115_200
     assert asked == pytest.approx(DEFAULT_RATES if whole else affordable(DEFAULT_RATES, baud / 10))
     assert (sum(asked.values()) == sum(DEFAULT_RATES.values())) is whole
+
+
+def test_a_px4_is_asked_for_the_message_of_its_first_compass():
+    address, living = over_udp(FakeVehicle(autopilot=mavlink.MAV_AUTOPILOT_PX4))
+    with living, connect(address, system=1) as link:
+        until(link, lambda: link.vehicle is not None)
+        link.request_streams({"RAW_IMU": 10.0, "ATTITUDE": 20.0}, PATIENCE_S)
+        assert link.requested_rates == {"SCALED_IMU": 10.0, "ATTITUDE": 20.0}
 
 
 class TestComingBack:
@@ -285,7 +292,8 @@ class TestWhyNot:
         stranger.close()
 
     def test_frames_of_another_kind_are_named(self):
-        radio = FakeVehicle(autopilot=mavlink.MAV_AUTOPILOT_INVALID, kind=mavlink.MAV_TYPE_GCS)
+        identity = {"autopilot": mavlink.MAV_AUTOPILOT_INVALID, "kind": mavlink.MAV_TYPE_GCS}
+        radio = FakeVehicle(heartbeat_s=0.0, **identity)
         address, living = over_udp(radio)
         with living:
             message = self.silent(address, timeout=0.5)
@@ -293,7 +301,7 @@ class TestWhyNot:
         assert "HEARTBEAT" in message
 
     def test_another_system_than_the_one_asked_for_is_named(self):
-        address, living = over_udp(FakeVehicle(system=7))
+        address, living = over_udp(FakeVehicle(system=7, heartbeat_s=0.0))
         with living:
             message = self.silent(address, timeout=0.5, system=3)
         assert "system 3 must be on the link; instead heard system 7" in message
@@ -413,7 +421,6 @@ def test_a_dead_transport_is_told_from_a_silent_one():
 class StalledTransport:
     """A line that takes nothing until it is let go."""
 
-    answers = True
     peer = None
 
     def __init__(self):

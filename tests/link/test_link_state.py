@@ -56,6 +56,18 @@ class TestFindingTheVehicle:
         found = [e for e in state.take_events() if isinstance(e, VehicleFound)]
         assert [event.vehicle for event in found] == [state.vehicle]
 
+    def test_what_a_bad_link_brings_late_is_learnt_and_announced(self):
+        vehicle, state = FakeVehicle(), LinkState()
+        lost = vehicle.parameters.pop("COMPASS_DEV_ID")
+        play(state, [vehicle], 0.0, 5.0)
+        assert state.identified(5.0)
+        assert lost not in state.vehicle.device_ids
+        vehicle.parameters["COMPASS_DEV_ID"] = lost
+        play(state, [vehicle], 5.0, 7.0)
+        assert state.vehicle.device_ids == tuple(DEVICE_IDS.values())
+        found = [e.vehicle for e in state.take_events() if isinstance(e, VehicleFound)]
+        assert found[-1] == state.vehicle != found[0]
+
     def test_a_vehicle_with_one_compass_is_identified_too(self):
         vehicle = FakeVehicle()
         vehicle.parameters = {"COMPASS_DEV_ID": 97539, "COMPASS_DEV_ID2": 0}
@@ -63,8 +75,9 @@ class TestFindingTheVehicle:
         play(state, [vehicle], 0.0, 5.0)
         assert state.identified(5.0)
         assert state.vehicle.device_ids == (97539,)
+        play(state, [vehicle], 5.0, 20.0)
         asked = vehicle.names_heard().count("PARAM_REQUEST_READ")
-        play(state, [vehicle], 5.0, 30.0)
+        play(state, [vehicle], 25.0, 20.0)
         assert vehicle.names_heard().count("PARAM_REQUEST_READ") == asked
 
     def test_a_third_of_all_frames_may_be_lost_each_way(self):

@@ -10,11 +10,12 @@ from link_vehicle import UNIX_US, FakeVehicle
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from magcomp.errors import LinkError
-from magcomp.link import StrangerHeard, connect
+from magcomp.link import Connection, StrangerHeard, connect
 from magcomp.link.address import UdpClient, UdpServer
 from magcomp.link.clock import SystemClock
 from magcomp.link.state import MOVED_S, SETTLING_S, LinkState
 from magcomp.link.udp import UdpTransport
+from magcomp.mavlink.header import message_id
 
 HERE, THERE = ("10.0.0.1", 14550), ("10.0.0.2", 40000)
 
@@ -82,6 +83,53 @@ def test_what_two_peers_send_in_halves_does_not_run_together():
     assert state.receive(theirs[:5], 5.0, THERE) == []
     assert [each.from_vehicle for each in state.receive(ours[7:], 5.1, HERE)] == [True]
     assert len(state.receive(theirs[5:], 5.1, THERE)) == 1
+
+
+class Two:
+    """A port at which the vehicle speaks, and a stranger in its name."""
+
+    def __init__(self):
+        self.clock = SystemClock()
+        self.peer = None
+        self.vehicle, self.stranger = FakeVehicle(), FakeVehicle()
+        self.kept_to = []
+        self.turns = 0
+
+    def read(self, _):
+        self.turns += 1
+        self.peer = HERE if self.turns % 2 else THERE
+        if self.peer == HERE:
+            return self.vehicle.tick(self.clock.monotonic())
+        return value(self.stranger, 7.0)
+
+    def write(self, data):
+        self.vehicle.hear(data)
+
+    def keep_to(self, peer):
+        self.kept_to.append(peer)
+
+    def close(self):
+        pass
+
+
+class Sink:
+    def __init__(self):
+        self.frames = []
+
+    def add(self, _, frame):
+        self.frames.append(frame)
+
+
+def test_a_stranger_is_neither_recorded_nor_spoken_to():
+    transport, sink = Two(), Sink()
+    with Connection(UdpServer("127.0.0.1", 1), lambda: transport, system=1, sinks=[sink]) as link:
+        link.wait_vehicle(60.0)
+        until = transport.turns + 20
+        while transport.turns < until:
+            link.receive(0.01)
+    assert set(transport.kept_to) == {HERE}
+    assert sink.frames
+    assert not any(message_id(frame) == mavlink.MAVLINK_MSG_ID_PARAM_VALUE for frame in sink.frames)
 
 
 def talk(client, vehicle, stop, wrote):

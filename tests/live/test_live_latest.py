@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from magcomp.live import latest as latest_module
 from magcomp.live.latest import Latest
-from magcomp.live.snapshot import slow_streams
+from magcomp.live.snapshot import slow_streams, warnings
 from magcomp.model import Vehicle
 
 VEHICLE = Vehicle("ardupilot", "copter", 1, 1)
@@ -36,6 +36,19 @@ def test_a_second_battery_alone_is_no_current() -> None:
     latest = Latest()
     latest.add(UNIX_US, battery(1, 3400))
     assert latest.now(VEHICLE).current is None
+
+
+def test_only_a_vehicle_that_says_so_has_no_current_sensor() -> None:
+    """A bad link, or a vehicle that answers nothing, brings no battery either."""
+    latest = Latest()
+    latest.add(UNIX_US, FakeVehicle().attitude())
+    assert latest.now(VEHICLE).current_sensor is None
+    assert not list(warnings(latest.now(VEHICLE), VEHICLE, {}, 0.0))
+    for centiamps in (-1, 1200):
+        latest.add(UNIX_US, battery(0, centiamps))
+        assert latest.now(VEHICLE).current_sensor is (centiamps > 0)
+        told = " ".join(warnings(latest.now(VEHICLE), VEHICLE, {}, 0.0))
+        assert ("no current sensor" in told) is (centiamps < 0)
 
 
 @pytest.mark.parametrize(

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import threading
 import time
+from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 import pytest
 from live_vehicle import COMPENSATION, PATIENCE_S, RATES, alive, free_port, held, landed
+from logs_made_of_logs import SWEEP, frames, write
 from truth import FIXTURES
 
 from magcomp.analysis import Options, analyse, parameter_set
@@ -155,6 +158,27 @@ def test_a_log_is_replayed_as_if_it_were_live():
     np.testing.assert_array_equal(live.field[1].time, logged.field[1].time)
     np.testing.assert_array_equal(live.field[1].value, logged.field[1].value)
     assert live.parameters == logged.parameters
+
+
+def test_what_another_vehicle_on_the_link_does_counts_for_nothing(tmp_path):
+    """A sweep on the ground, and above it somebody flies."""
+    swept, flown = (
+        list(islice(frames(log), 6000)) for log in (SWEEP, FIXTURES / "flight_low_rate.tlog")
+    )
+    later = swept[0].arrival_us - flown[0].arrival_us
+    above = (replace(each, system=2, arrival_us=each.arrival_us + later) for each in flown)
+    both = sorted([*swept, *above], key=lambda frame: frame.arrival_us)
+    shown = []
+    for name, kept in (("alone", swept), ("both", both)):
+        log = write(tmp_path / f"{name}.tlog", kept)
+        with LiveSession.open(f"{log},5000x", system=1, refit_share=0.0) as session:
+            until(lambda shown: shown.ended, session)
+            shown.append(session.snapshot())
+    alone, beside = shown
+    assert beside.situation is alone.situation is Situation.STILL
+    assert beside.recorded_s == alone.recorded_s
+    assert beside.level_seconds == alone.level_seconds
+    np.testing.assert_array_equal(beside.coverage.counts, alone.coverage.counts)
 
 
 # ---------------------------------------------------------------- what is warned of

@@ -93,6 +93,8 @@ def test_a_vehicle_tipped_over_is_held_and_stays_so():
     assert watch.situation is Situation.HELD
     watched(tilted(5, 2), watch=watch, start=30.0, armed=False)
     assert watch.situation is Situation.HELD
+    watched(tilted(12, 60), free, watch=watch, start=33.0)
+    assert watch.situation is Situation.HELD
 
 
 def test_a_steady_wind_holds_a_hover_tilted_and_nobody_is_told_a_throttle():

@@ -67,6 +67,17 @@ class TestFirstLine:
         (line,) = pilots_lines(changed(flown().document, 1, quoted=row))
         assert line.endswith("Leave it as it is.")
 
+    def test_what_a_vehicle_that_stood_still_shows_is_written_though_its_bound_is_no_less(
+        self,
+    ) -> None:
+        row = {**still().document["compasses"][0]["quoted"], "before": 5.0, "p95": 7.1}
+        document = {**still().document, "compasses": still().document["compasses"][:1]}
+        (line,) = pilots_lines(changed(document, 1, quoted=row))
+        assert "your motors turn your compass by 5.0°. These numbers take that out. Write" in line
+        unsure = [1.2 * abs(value) for value in document["compasses"][0]["interference_mgauss"]]
+        (line,) = pilots_lines(changed(document, 1, quoted=row, std_mgauss=unsure))
+        assert line.endswith("Leave it as it is.")
+
     def test_a_rejected_fit_says_why_and_never_write_them(self) -> None:
         (line,) = pilots_lines(refused().document)
         assert line.startswith("Do not write these numbers. ")

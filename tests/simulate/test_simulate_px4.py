@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from px4_truth import RECORDINGS
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from magcomp.autopilots.px4_correction import correct, stored
@@ -69,8 +70,7 @@ class Heard:
         return [decode_param_value(each, HOW) for each in told]
 
 
-def real_frames():
-    data = gzip.decompress((FIXTURES / "px4_link.tlog.gz").read_bytes())
+def real_frames(data):
     splitter, place, begin = Splitter(), 0, None
     while place + 8 < len(data):
         (stamp,) = struct.unpack(">Q", data[place : place + 8])
@@ -83,7 +83,7 @@ def real_frames():
 
 @pytest.fixture(scope="module")
 def real():
-    frames = list(real_frames())
+    frames = list(real_frames(gzip.decompress((FIXTURES / "px4_link.tlog.gz").read_bytes())))
     return Heard(f for f in frames if f[0] < ASKED_AT_S), Heard(
         f for f in frames if f[0] >= ASKED_AT_S
     )
@@ -198,3 +198,59 @@ def test_asked_for_the_truth_it_says_how_it_really_stands_and_no_fit_sees_it(tmp
     here = recording.position.value.mean(axis=0)[:2]
     assert truth.position.value.mean(axis=0) == pytest.approx(here, abs=1e-3)
     assert mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION not in WANTED
+
+
+IN_THE_AIR = (60.0, 120.0)
+NOT_SIMULATED = {
+    # The recordings' battery is fed over MAVLink (their README); its voltage and charge stand.
+    *(("BATTERY_STATUS", each) for each in ("id", "temperature", "voltages", "time_remaining")),
+    *(("BATTERY_STATUS", each) for each in ("current_consumed", "battery_remaining")),
+    *(("SYS_STATUS", each) for each in ("voltage_battery", "battery_remaining")),
+    # Which parts a vehicle has, and how well its receiver and its estimator say that they do.
+    *(("SYS_STATUS", f"onboard_control_sensors_{each}") for each in ("present", "health")),
+    ("SYS_STATUS", "onboard_control_sensors_health_extended"),
+    ("ESTIMATOR_STATUS", "flags"),
+    *(("GPS_RAW_INT", each) for each in ("h_acc", "v_acc", "vel_acc")),
+}
+
+
+def in_the_air(frames):
+    return Heard(f for f in frames if IN_THE_AIR[0] <= f[0] < IN_THE_AIR[1])
+
+
+@pytest.fixture(scope="module", params=["flight", "flight_default_rates"])
+def flights(request):
+    """A real one as its link told it, whole, and a simulated one asked for the same rates."""
+    path = RECORDINGS / f"{request.param}.tlog"
+    if not path.exists():
+        pytest.skip("the shared recordings are not there")
+    rates = PX4_RATES if request.param == "flight" else {}
+    flown = record(
+        Vehicle(scenario("flight", 1), autopilot="px4"), seconds=IN_THE_AIR[1], rates=rates
+    )
+    return in_the_air(real_frames(path.read_bytes())), in_the_air(flown)
+
+
+def test_in_the_air_the_same_messages_come_as_often(flights):
+    real, simulated = flights
+    assert set(real.by_name) - set(simulated.by_name) <= LEFT_OUT
+    assert set(simulated.by_name) <= set(real.by_name)
+    often = [name for name, said in simulated.by_name.items() if len(said) > 20]
+    assert len(often) > 10
+    for name in often:
+        assert simulated.rate(name) == pytest.approx(real.rate(name), rel=0.1), name
+
+
+def test_in_the_air_what_never_changes_is_the_same(flights):
+    """Modes, masks, units, unused outputs and what stands where a value is not known."""
+
+    def lasting(heard, name, field):
+        values = {str(getattr(message, field)) for _, message in heard.by_name[name]}
+        return values.pop() if len(values) == 1 else None
+
+    real, simulated = flights
+    for name in set(real.by_name) - LEFT_OUT:
+        for field in real.by_name[name][0][1].fieldnames:
+            expected = lasting(real, name, field)
+            if expected is not None and (name, field) not in NOT_SIMULATED:
+                assert lasting(simulated, name, field) == expected, (name, field)

@@ -20,6 +20,7 @@ from magcomp.analysis import Options
 from magcomp.cli.app import app as command_line
 from magcomp.errors import MissingDataError
 from magcomp.fit import METHODS
+from magcomp.report.plain import table_rows
 from magcomp.tui import fitting
 from magcomp.tui.fits import fit_rows
 from magcomp.tui.screens.dialogs import Confirm, Message
@@ -65,7 +66,7 @@ async def test_what_the_screen_shows_is_what_fit_json_prints(tmp_path, json_answ
             await press(pilot, str(compass["compass"]))
             await pilot.pause()
             shown = screen(pilot.app)
-            for row in compass["heading_error_deg"]:
+            for row in table_rows(compass):
                 # What cannot be told from the fit is no worse than it.
                 now = max(row["before"], row["p95"] if row["before"] <= row["p95"] else 0.0)
                 for value in (now, row["after"], row["p95"]):
@@ -173,53 +174,35 @@ async def test_a_time_range_is_chosen_by_eye_with_the_arrow_keys(tmp_path):
         )
 
 
-async def test_every_method_is_reached_and_one_that_cannot_fit_does_not_end_the_round(
-    tmp_path, monkeypatch
+@pytest.mark.parametrize(
+    ("key", "option", "impossible", "round_trip"),
+    [
+        ("m", "method", ("levels", "flight"), {*METHODS}),
+        ("r", "regressor", ("throttle", "motors"), {"current", "throttle", "motors", "auto"}),
+    ],
+)
+async def test_every_choice_is_reached_and_one_that_cannot_be_fitted_does_not_end_the_round(
+    key, option, impossible, round_trip, tmp_path, monkeypatch
 ):
     def fit(_recording, options, _progress):
-        if options.method in ("levels", "flight"):
-            raise MissingDataError(f"{options.method} must have turns; instead there are none")
+        if getattr(options, option) in impossible:
+            raise MissingDataError(f"{option} must have what it needs; instead it has not")
         return made.analysis(), made.pictures(made.analysis())
 
     monkeypatch.setattr(fitting, "fit", fit)
     app = scripted.app(tmp_path)
     async with app.run_test() as pilot:
         await until(pilot, lambda: app.choices)
-        app.set_work(made.work())
+        app.set_work(replace(made.work(), recording=Unequal(seed=1).recording()))
         app.action_go("fit")
         await until(pilot, lambda: "Heading error" in screen(app))
         tried = []
-        for _ in METHODS:
-            await press(pilot, "m")
-            tried.append(app.asked.method)
+        for _ in round_trip:
+            await press(pilot, key)
+            tried.append(getattr(app.asked, option))
             if isinstance(app.screen, Message):
                 await press(pilot, "enter")
-        assert sorted(tried) == sorted(METHODS)
-
-
-async def test_every_quantity_is_reached_and_one_that_cannot_be_fitted_does_not_end_the_round(
-    tmp_path, monkeypatch
-):
-    def fit(_recording, options, _progress):
-        if options.regressor in ("throttle", "motors"):
-            raise MissingDataError(f"{options.regressor} must be there; instead it is not")
-        return made.analysis(), made.pictures(made.analysis())
-
-    monkeypatch.setattr(fitting, "fit", fit)
-    app = scripted.app(tmp_path)
-    async with app.run_test() as pilot:
-        await until(pilot, lambda: app.choices)
-        work = made.work()
-        app.set_work(replace(work, recording=Unequal(seed=1).recording()))
-        app.action_go("fit")
-        await until(pilot, lambda: "Heading error" in screen(app))
-        tried = []
-        for _ in range(4):
-            await press(pilot, "r")
-            tried.append(app.asked.regressor)
-            if isinstance(app.screen, Message):
-                await press(pilot, "enter")
-        assert tried == ["current", "throttle", "motors", "auto"]
+        assert set(tried) == round_trip
 
 
 async def test_the_report_of_what_is_shown_is_saved_and_told_of_on_leaving(tmp_path):

@@ -16,10 +16,12 @@ from magcomp.analysis import check
 from magcomp.errors import LinkError, LinkTimeoutError, VehicleRefusedError, WriteError
 from magcomp.live.guide import Guidance
 from magcomp.live.situation import Manoeuvre, Situation
-from magcomp.model import Grade, ParameterChange, ParameterHistory
+from magcomp.model import Grade, HeadingError, ParameterChange, ParameterHistory, Verdict
+from magcomp.report import words
+from magcomp.report.as_json import quoted
 from magcomp.sources import read
 from magcomp.tui import opening, writing
-from magcomp.tui.promise import Promise
+from magcomp.tui.promise import Kept, Promise, promises
 from magcomp.tui.screens.connect import AddressInput
 from magcomp.tui.screens.dialogs import Confirm, Message
 from magcomp.tui.status import link_words
@@ -482,7 +484,9 @@ async def test_after_the_next_flight_the_promise_stands_beside_what_was_measured
         worst = {
             number: max(r.before for r in v.heading_error) for number, v in check(flown).items()
         }
+        hover = {c.fit.compass: quoted(c)["u"] for c in app.writing.promised.compasses}
         for promise in app.writing.measured:
+            assert promise.u == hover[promise.compass]
             assert 0.0 < promise.measured <= worst[promise.compass]
             assert promise.promised == pytest.approx(0.1 + 0.006 * promise.u, abs=1e-6)
 
@@ -497,6 +501,35 @@ async def test_after_the_next_flight_the_promise_stands_beside_what_was_measured
 )
 def test_a_promise_is_kept_broken_or_not_to_be_told(measured, doubt, says):
     assert says in Promise(1, 24.0, "current", 0.4, measured, doubt).sentence
+
+
+def measured(*errors: tuple[float, float, float]) -> Verdict:
+    """What a flight shows: load, error in force, at most."""
+    rows = tuple(HeadingError(u, before, before, p95) for u, before, p95 in errors)
+    return replace(made.result(1).verdict, heading_error=rows)
+
+
+def test_a_promise_is_told_of_the_hover_and_of_another_load_only_where_it_is_broken_there():
+    analysis = made.analysis(Grade.GOOD)
+    hover = quoted(analysis.compasses[0])["u"]
+    kept = measured((hover - 10.0, 0.0, 0.1), (hover + 10.0, 0.1, 0.2))
+    broken = measured((hover - 10.0, 0.0, 0.1), (hover, 0.1, 0.2), (hover + 10.0, 9.0, 9.5))
+    unsure = measured((hover - 10.0, 0.0, 0.1), (hover, 0.1, 0.2), (hover + 10.0, 0.9, 9.5))
+    for found in (kept, unsure):
+        (promise,) = promises(analysis, {1: found})
+        assert (promise.u, promise.kept, promise.elsewhere) == (hover, Kept.YES, None)
+    (promise,) = promises(analysis, {1: broken})
+    assert promise.u == hover
+    at = words.quantity(hover + 10.0, "current")
+    assert f"✓, but at {at}: promised" in promise.sentence
+    assert promise.sentence.endswith("so fit this flight and write again")
+
+
+def test_a_promise_is_not_told_of_a_load_that_was_not_flown():
+    analysis = made.analysis(Grade.GOOD)
+    hover = quoted(analysis.compasses[0])["u"]
+    (promise,) = promises(analysis, {1: measured((hover + 5.0, 0.1, 0.2), (hover + 9.0, 0.2, 0.3))})
+    assert promise.u == hover + 5.0
 
 
 def _at(current: float, *, written: bool = False):

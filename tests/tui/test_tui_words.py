@@ -20,6 +20,7 @@ from scripted import screen, until
 from textual.color import Color
 
 from magcomp.analysis import Options
+from magcomp.errors import WriteError
 from magcomp.live.guide import Guidance
 from magcomp.live.progress import Bound, HoverBound, hover_bound
 from magcomp.model import Grade, ParameterSet
@@ -27,6 +28,7 @@ from magcomp.report.ascii import is_ascii_only, plain
 from magcomp.tui.before_after import HeadingPair, HeadingWatch, heading_pairs
 from magcomp.tui.changes import after_event, change_rows
 from magcomp.tui.fits import difference_deg, fit_rows
+from magcomp.tui.next_step import explain
 from magcomp.tui.pictures import round_ticks
 from magcomp.tui.state import State
 from magcomp.tui.themes import SUN
@@ -368,3 +370,12 @@ def test_a_heading_that_passes_north_has_moved_by_little():
 def test_without_current_nothing_is_invented():
     live = made.snapshot(current=None)
     assert all(pair.after is None for pair in heading_pairs(live, made.work(), Writing()))
+
+
+def test_a_command_that_a_sentence_ends_with_stands_as_it_is_typed():
+    sentence, _ = explain(
+        WriteError("the write failed. Bring it back with:\n  magcomp restore a.p")
+    )
+    assert sentence == "The write failed. Bring it back with:\nmagcomp restore a.p"
+    sentence, _ = explain(WriteError("the write failed"))
+    assert sentence == "The write failed."

@@ -9,6 +9,7 @@ from fake_autopilot import FakeLink, Network, VirtualClock
 from fake_px4 import NEW, OLD, QUAD, SWITCH, FakePx4
 from px4_faults import FAULTS, clean_messages, is_so, strike, upload
 
+from magcomp import autopilots
 from magcomp.model import ParameterSet
 
 
@@ -36,6 +37,11 @@ def test_what_was_confirmed_is_still_there_after_a_power_cut(tmp_path):
     assert upload(FakeLink(vehicle, clock), tmp_path / "b.param").good
     vehicle.reboot(clock.now, stored=False)
     assert vehicle.calibration() == NEW
+
+
+def test_after_each_stage_that_writes_px4_has_the_time_to_save():
+    _, seconds = clean_messages()
+    assert seconds > 3 * autopilots.of(QUAD).storage_s > 3 * 2.0
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -24,6 +24,7 @@ INT32 = 6
 """MAV_PARAM_TYPE_INT32."""
 
 _NUMBERS = tuple(slot + 1 for slot in SLOTS)
+_DEVICES = {number: single_name("ID", number) for number in _NUMBERS}
 _ALWAYS_SHOWN = ("ID", "ROT")
 _NOTICED = 1.2e-7
 _SAVED_AFTER_S, _SAVED_AGAIN_S = 0.3, 2.0
@@ -57,6 +58,7 @@ class Parameters(Held):
             if name not in self._types:
                 self._types[name], self._values[name] = kind, value
         self._order = tuple(sorted(self._types))
+        self._shown: dict[tuple[int, ...], tuple[str, ...]] = {}
         for name, value in values.items():
             if name in self._types:
                 self._values[name] = self._held(name, value)
@@ -65,14 +67,16 @@ class Parameters(Held):
     @property
     def shown(self) -> tuple[str, ...]:
         """The names in the list, by index: of a free slot, its id and rotation only."""
-        hidden = {
-            name
-            for number in _NUMBERS
-            if not self._values[single_name("ID", number)]
-            for name, _, _ in _slot(number)
-            if not name.endswith(_ALWAYS_SHOWN)
-        }
-        return tuple(name for name in self._order if name not in hidden)
+        free = tuple(number for number, name in _DEVICES.items() if not self._values[name])
+        if free not in self._shown:
+            hidden = {
+                name
+                for number in free
+                for name, _, _ in _slot(number)
+                if not name.endswith(_ALWAYS_SHOWN)
+            }
+            self._shown[free] = tuple(name for name in self._order if name not in hidden)
+        return self._shown[free]
 
     @property
     def unsaved(self) -> tuple[str, ...]:

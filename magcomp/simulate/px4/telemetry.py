@@ -7,6 +7,7 @@ estimator has learned.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -252,8 +253,9 @@ def _gps_raw_int(view: View) -> Any:
 def _altitude(view: View) -> Any:
     altitude = view.geodetic()[2]
     above = altitude - view.home[2]
+    # Nothing measures how far the ground is.
     return mavlink.MAVLink_altitude_message(
-        view.boot_us, altitude, altitude, above, above, above, above
+        view.boot_us, altitude, altitude, above, above, math.nan, math.nan
     )
 
 

@@ -16,7 +16,7 @@ from magcomp.live.snapshot import LiveSnapshot
 from magcomp.model import Analysis, Grade
 from magcomp.report import words
 from magcomp.report.as_json import analysis_object
-from magcomp.report.plain import pilots_lines
+from magcomp.report.plain import doubts, pilots_lines
 from magcomp.tui.changes import ChangeRow
 from magcomp.tui.messages import CompassToggled
 from magcomp.tui.screens.step import StepScreen
@@ -94,7 +94,7 @@ class ReviewScreen(StepScreen):
         self.query_one("#reason").display = work.analysis is not None and not writing.in_force
         self._fill(writing.rows)
         table = self.query_one(ChangeTable)
-        table.border_subtitle = f"{len(writing.rows)} parameters"
+        table.border_subtitle = words.counted(len(writing.rows), "parameter")
         place = self._place()
         self.query_one("#place", Static).update(place)
         self.query_one("#place").display = bool(place.plain)
@@ -182,12 +182,13 @@ def chosen_line(analysis: Analysis, chosen: frozenset[int]) -> Content:
 
 
 def benefit(analysis: Analysis) -> Content:
-    """Grade and reasons of each compass: why one would write this."""
+    """Grade and doubts of each compass; what writing brings, the line above says."""
     blocks = []
     for result in analysis.compasses:
         title = Content.assemble((f"Compass {result.fit.compass}  ", "bold"))
         lines = [Content.assemble(title, grade_word(result.verdict.grade))]
-        lines += [Content(words.sentence(reason)) for reason in result.verdict.reasons]
+        told = doubts(result.verdict.reasons, result.verdict.grade)
+        lines += [Content(words.sentence(reason)) for reason in told]
         blocks.append(Content("\n").join(lines))
     return Content("\n\n").join(blocks)
 

@@ -23,7 +23,8 @@ class HeadingTable(Drawn[tuple[ErrorRow, ...]]):
 - *corrected*: with this fit, as expected.
 - *at most*: with this fit, not exceeded with 95 % probability.
 
-Rows with `*` were not reached in the recording: they are extrapolated.
+Rows with `*` were not reached in the recording: they are extrapolated. The first line is of the
+row in bold.
 """
 
     SETS_HEIGHT = True
@@ -42,7 +43,8 @@ Rows with `*` were not reached in the recording: they are extrapolated.
         for row in data:
             lines.append(
                 Content.assemble(
-                    f"{row.label:>7}{' ' if row.covered else '*'} ",
+                    (f"{row.label:>7}", "bold" if row.is_quoted else ""),
+                    f"{' ' if row.covered else '*'} ",
                     f"{row.now:>8}° ",
                     tail(max(row.before, row.floor) / largest, length, style="$error"),
                     f"{row.after:9.1f}°",

@@ -6,6 +6,8 @@ pilot who sees none, reads the same.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from textual.color import Color
 from textual.widget import Widget
 from textual_plotext import PlotextPlot
@@ -17,6 +19,24 @@ from magcomp.tui.pictures import AXES, AXIS_WORDS, Unexplained, round_ticks
 
 AXIS_COLOURS = ("error", "success", "primary")
 """Of forward, right and down, as names in the theme; the letters say the same."""
+
+_BELOW = 3
+"""Lines below a plot: its axis, the numbers there, and what they are of."""
+
+
+def one_a_row(ticks: Sequence[float], ends: tuple[float, float], rows: int) -> list[float]:
+    """One of the numbers in each row of a plot: which of two were shown is left to chance.
+
+    Examples
+    --------
+    >>> one_a_row([0.0, 20.0, 40.0], (0.0, 56.0), 3)
+    [0.0, 20.0]
+    """
+    kept: dict[int, float] = {}
+    for tick in ticks:
+        row = int(0.5 + (tick - ends[0]) / (ends[1] - ends[0]) * max(rows - 1, 0))
+        kept[row] = min(kept.get(row, tick), tick, key=abs)
+    return list(kept.values())
 
 
 class Picture(PlotextPlot):
@@ -54,6 +74,8 @@ class Picture(PlotextPlot):
         """Round numbers, as many as there is room for."""
         across = round_ticks(*x, max(self.size.width // 10, 2))
         up = round_ticks(*y, max(self.size.height // 2, 4))
+        if y[1] > y[0]:
+            up = one_a_row(up, y, self.size.height - _BELOW)
         self.plt.xlim(*x)
         self.plt.ylim(*y)
         self.plt.xticks(across, [f"{value:g}" for value in across])

@@ -17,6 +17,9 @@ from magcomp.tui.pictures import AXIS_WORDS
 from magcomp.tui.widgets.drawn import Drawn
 
 MARKS = {Grade.GOOD: "●", Grade.MARGINAL: "◐", Grade.REJECTED: "○"}
+_MOST_LINES, _NARROW = 4, 70
+"""Lines there are for what to do and why, and columns below which the former needs most of them."""
+
 STYLES = {Grade.GOOD: "$success", Grade.MARGINAL: "$warning", Grade.REJECTED: "$error"}
 
 
@@ -30,13 +33,13 @@ def grade_so_far(grade: Grade, *, early: bool) -> Content:
     return Content("… too early") if early and grade is Grade.REJECTED else grade_word(grade)
 
 
-class ReasonLine(Drawn[tuple[str, Grade, str]]):
+class ReasonLine(Drawn[tuple[str, str, Grade, str]]):
     """Why a pilot should write a compass's fit, or must not: before any number."""
 
     SETS_HEIGHT = True
 
     def show(self, result: CompassResult, line: str, *, early: bool) -> None:
-        """Draw the pilot's line, or why one compass is not good.
+        """Draw the pilot's line, and why one compass is not good; of one that is not, that alone.
 
         Parameters
         ----------
@@ -49,21 +52,29 @@ class ReasonLine(Drawn[tuple[str, Grade, str]]):
         """
         reasons, grade = result.verdict.reasons, result.verdict.grade
         text = words.sentence(reasons[0]) if reasons else ""
-        if grade is Grade.GOOD:
-            text = line
-        title = "" if grade is Grade.GOOD else f"Compass {result.fit.compass} is {grade.value}: "
+        title = f"Compass {result.fit.compass} is {grade.value}: "
         if early and grade is Grade.REJECTED:
             title = f"Too early for compass {result.fit.compass}: "
-        self.draw_data((title, grade, text))
+        rejected = grade is Grade.REJECTED
+        doubt = ("", "") if grade is Grade.GOOD else (title, text)
+        self.draw_data(("" if rejected else line, doubt[0], grade, doubt[1]))
 
-    def picture(self, data: tuple[str, Grade, str], width: int, height: int) -> Content:  # noqa: ARG002
-        """One line or two; what does not fit stands in the verdict."""
-        title, grade, reason = data
-        lines = textwrap.wrap(
-            f"{title}{reason}", max(width - 2, 20), max_lines=2, placeholder=" … (V: verdict)"
-        )
-        whole = Content("\n".join(f" {line}" for line in lines))
-        return whole.stylize(f"bold {STYLES[grade]}", 0, len(title) + 1) if title else whole
+    def picture(self, data: tuple[str, str, Grade, str], width: int, height: int) -> Content:  # noqa: ARG002
+        """What to do, and in a line or two why; what does not fit stands in the verdict."""
+        line, title, grade, reason = data
+        most = 1 if line and width < _NARROW else 2
+
+        def laid_out(text: str, most: int) -> Content:
+            lines = textwrap.wrap(
+                text, max(width - 2, 20), max_lines=most, placeholder=" … (V: verdict)"
+            )
+            return Content("\n".join(f" {each}" for each in lines))
+
+        parts = [laid_out(line, _MOST_LINES - most)] if line else []
+        if title:
+            style = f"bold {STYLES[grade]}"
+            parts.append(laid_out(f"{title}{reason}", most).stylize(style, 0, len(title) + 1))
+        return Content("\n").join(parts)
 
 
 class VerdictText(VerticalScroll):
