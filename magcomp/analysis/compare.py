@@ -10,7 +10,17 @@ import numpy as np
 from magcomp.errors import MagcompError
 from magcomp.fit import Problem, best_form, fit_alike, solvable
 from magcomp.judge import Thresholds, apart_at_rest, field_residual
-from magcomp.model import CURRENT, MOTORS, THROTTLE, Control, Grade, HeadingError, MotorFit, Verdict
+from magcomp.model import (
+    CURRENT,
+    MOTORS,
+    THROTTLE,
+    Control,
+    Grade,
+    HeadingError,
+    MotorFit,
+    Verdict,
+    quantity_of,
+)
 
 BETTER, CLEARLY_BETTER = 0.97, 0.8
 """Throttle is written instead of current only where it leaves less than the first share of what
@@ -120,7 +130,7 @@ def doubted(
     limits
         The limits; the defaults are the product's.
     """
-    if chosen != CURRENT:
+    if quantity_of(chosen).is_throttle:
         return tuple(judged[chosen])
     by_throttle = rivals or [Rival(each.fit, each.held_out) for each in judged.get(THROTTLE, ())]
     by_compass = {rival.fit.compass: rival for rival in by_throttle}
