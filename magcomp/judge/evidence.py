@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from magcomp.errors import FitRejectedError
@@ -104,8 +106,15 @@ def cover(samples: Samples, corrected: FloatArray) -> Coverage:
         u_low=float(np.quantile(total, 0.02)),
         u_high=float(np.quantile(total, 0.98)),
         seconds=float(np.sum(steps[steps < _GAP_S])),
-        u_median=float(np.median(total[total >= _IDLE_SHARE * total.max()])),
+        u_median=_at_work(total),
     )
+
+
+def _at_work(total: FloatArray) -> float:
+    """Control quantity in use half of the time the motors worked; NaN where they never did."""
+    working = total[total >= _IDLE_SHARE * total.max()]
+    # A current told with the wrong sign is never near the largest there is.
+    return float(np.median(working)) if len(working) else math.nan
 
 
 def _field_heading(corrected: FloatArray, samples: Samples) -> FloatArray:

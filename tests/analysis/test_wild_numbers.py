@@ -78,3 +78,12 @@ def test_a_compass_that_reads_zero_without_a_position_is_named() -> None:
     dead = replace(with_series(recording, "field", nothing), position=None)
     with pytest.raises(MissingDataError, match="compass 1 reads zero throughout"):
         analyse(dead)
+
+
+def test_a_current_that_is_told_with_the_wrong_sign_throughout_is_answered_without_a_warning() -> (
+    None
+):
+    recording = flown()
+    assert recording.current is not None
+    backwards = Series(recording.current.time, -np.abs(recording.current.value))
+    must_be_answered(with_series(recording, "current", backwards))
