@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from magcomp.errors import FitRejectedError
@@ -111,10 +109,10 @@ def cover(samples: Samples, corrected: FloatArray) -> Coverage:
 
 
 def _at_work(total: FloatArray) -> float:
-    """Control quantity in use half of the time the motors worked; NaN where they never did."""
+    """Control quantity in use half of the time the motors worked."""
     working = total[total >= _IDLE_SHARE * total.max()]
     # A current told with the wrong sign is never near the largest there is.
-    return float(np.median(working)) if len(working) else math.nan
+    return float(np.median(working if len(working) else total))
 
 
 def _field_heading(corrected: FloatArray, samples: Samples) -> FloatArray:

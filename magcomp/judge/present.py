@@ -59,8 +59,9 @@ def judge_present(
     Notes
     -----
     At each level of the control quantity, what the reported field is off by on average, as one
-    body-fixed vector, is turned into degrees. A heading error that is the same at every level
-    and changes neither strength nor dip cannot be seen this way.
+    body-fixed vector, is turned into degrees: off the earth's field at the place, for what a
+    median of the readings shows has in it what the motors add on the whole. A heading error that
+    is the same at every level and changes neither strength nor dip cannot be seen this way.
     """
     limits = Thresholds() if thresholds is None else thresholds
     require_readings(problem.readings)
@@ -70,8 +71,8 @@ def judge_present(
     if present is not in_force.correction:
         # Told by one quantity, it must still correct every reading as the firmware did.
         samples = replace(samples, raw=present.undo(samples.present, samples.u))
-    middle = np.median(departures(samples.present, samples.down, 0.0, 0.0), axis=0)
-    earth = (float(middle[0]), float(middle[1]))
+    strength = problem.earth.strength
+    earth = (strength, strength * float(np.sin(problem.earth.dip)))
     left = departures(samples.present, samples.down, *earth)
     noise = max(_MAD_TO_STD * float(np.median(np.abs(left))), 0.2)
     still = is_still(samples)

@@ -437,6 +437,19 @@ def test_the_bound_of_a_level_holds_its_doubt_to_both_sides():
 CALIBRATED = {"COMPASS_MOTCT": 2.0, **ardupilot.correction_parameters(EXACT, 1, 1.0)}
 
 
+def test_what_the_motors_add_on_the_whole_is_seen_in_the_calibration_in_force():
+    """Where the load hardly changes, the readings by themselves look like an earth."""
+    recording = Flown(seed=1, swing=3.0).recording()
+    by_fit = judged(recording)[1].heading_error
+    rows = judge_present(problem_of(recording)).heading_error
+    exact = np.interp(
+        [row.u for row in rows], *zip(*((r.u, r.before) for r in by_fit), strict=True)
+    )
+    assert len(rows) > 3
+    assert [row.before for row in rows] == pytest.approx(exact, rel=0.15)
+    assert all(row.p95 > true for row, true in zip(rows, exact, strict=True))
+
+
 def test_motors_that_are_off_prove_nothing_about_the_calibration_in_force():
     flown = Flown(seed=1, in_force=CALIBRATED).recording()
     idle = Series(flown.current.time, 0.3 + 1e-3 * np.sin(flown.current.time))
