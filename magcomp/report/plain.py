@@ -109,11 +109,12 @@ def check_line(document: Document) -> str:
     judged = [compass for compass in compasses if compass["quoted"] is not None]
     if not judged:
         return "This log is too short to say how wrong your compass is."
-    worst = max(judged, key=lambda compass: float(compass["quoted"]["in_force"]))
+    flown = _flown_by(document, judged)
+    worst = max(flown, key=lambda compass: float(compass["quoted"]["in_force"]))
     row = worst["quoted"]
     u = quantity_of(worst["regressor"]).in_sentence(row["u"])
     where = f"{u}, the usual load," if row["hover"] else u
-    many = len(compasses) > 1
+    many = len(flown) > 1
     who, verb = ("compasses", "are") if many else ("compass", "is")
     now = words.degrees(row["in_force"])
     if all(compass["verdict"] == Grade.GOOD for compass in compasses):
@@ -121,6 +122,17 @@ def check_line(document: Document) -> str:
         most = words.degrees(row["p95"])
         return f"Your {who} {verb} right: at {where} wrong by {now}, at most by {most}. {leave}"
     return f"At {where} your {who} {verb} up to {now} wrong. Fit this log: magcomp fit."
+
+
+def _flown_by(
+    document: Document, group: Sequence[Mapping[str, Any]]
+) -> Sequence[Mapping[str, Any]]:
+    """Those of a group that the autopilot uses; all where it uses none of them.
+
+    What a compass that is switched off would be wrong by is no error of the vehicle's.
+    """
+    used = {each["slot"] for each in document["vehicle"]["compasses"] if each["used"]}
+    return [compass for compass in group if compass["compass"] in used] or group
 
 
 def _where(document: Document, compass: Mapping[str, Any]) -> str:
@@ -131,6 +143,8 @@ def _where(document: Document, compass: Mapping[str, Any]) -> str:
 
 
 def _write(document: Document, group: Sequence[Mapping[str, Any]], *, alone: bool) -> str:
+    doubt = any(compass["verdict"] == Grade.MARGINAL for compass in group)
+    group = _flown_by(document, group)
     worst = max(group, key=lambda compass: float(compass["quoted"]["before"]))
     now = words.degrees(worst["quoted"]["before"])
     bound = words.degrees(max(compass["quoted"]["p95"] for compass in group))
@@ -138,7 +152,6 @@ def _write(document: Document, group: Sequence[Mapping[str, Any]], *, alone: boo
     many = len(group) > 1
     who = ("your compasses" if many else "your compass") if alone else _named(group)
     verb = "are up to" if many else "is"
-    doubt = any(compass["verdict"] == Grade.MARGINAL for compass in group)
     end = "Write them, with the doubt below in mind." if doubt else "Write them."
     at = f"{where[:1].upper()}{where[1:]}"
     if is_no_better(worst["quoted"]):

@@ -57,6 +57,22 @@ class TestFirstLine:
         assert words.degrees(row["before"]) in line
         assert words.degrees(row["p95"]) in line
 
+    def test_a_compass_that_is_switched_off_makes_no_error_of_the_vehicles(self) -> None:
+        document = copy.deepcopy(flown().document)
+        (own,) = document["compasses"]
+        off = {**own["quoted"], "before": 170.0, "p95": 9.0}
+        document["compasses"].append({**own, "compass": 2, "quoted": off})
+        document["vehicle"]["compasses"] = [
+            {"slot": slot, "device_id": 1, "external": True, "used": slot == 1} for slot in (1, 2)
+        ]
+        (line,) = pilots_lines(document)
+        assert f"your compass is {words.degrees(own['quoted']['before'])} wrong" in line
+        assert words.degrees(own["quoted"]["p95"]) in line
+        for each in document["vehicle"]["compasses"]:
+            each["used"] = False
+        (line,) = pilots_lines(document)
+        assert "your compasses are up to 170° wrong" in line
+
     def test_a_calibration_that_stays_is_left_as_it_is(self) -> None:
         (line,) = pilots_lines(changed(flown().document, 1, kept=True))
         assert line.endswith("Leave it as it is.")
