@@ -138,15 +138,17 @@ def doubted(
     left = [by_compass[each.fit.compass].held_out for each in both]
     if not both or _typical(left) > _typical([each.held_out for each in both]):
         return tuple(judged[chosen])
-    most = (limits or Thresholds()).good_deg
-    return tuple(_doubted(each, by_compass.get(each.fit.compass), most) for each in judged[chosen])
+    limits = limits or Thresholds()
+    return tuple(
+        _doubted(each, by_compass.get(each.fit.compass), limits) for each in judged[chosen]
+    )
 
 
-def _doubted(each: Judged, rival: Rival | None, most: float) -> Judged:
+def _doubted(each: Judged, rival: Rival | None, limits: Thresholds) -> Judged:
     if each.verdict.grade is not Grade.GOOD or rival is None:
         return each
     apart = apart_at_rest(each.fit, rival.fit.correction)
-    if apart <= most:
+    if apart <= limits.beside(_bound(each)):
         return each
     reason = (
         f"throttle explains the field as well as current, and the two differ by {apart:.0f}° at "

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 TWO_SIDED_95 = 1.96
+
+_DRIFTS = 1.5
+"""A step of so many times the limit is no drift whatever the bound."""
 
 
 @dataclass(frozen=True)
@@ -55,3 +59,19 @@ class Thresholds:
     departure_deg: float = 1.0
     useless_deg: float = 20.0
     least_seconds: float = 12.0
+
+    def beside(self, bound: float) -> float:
+        """Degrees that something doubtful may add to a bound and leave the fit good.
+
+        Both together are no more than a good fit may leave; but a sensor's usual drift is in the
+        bound already, and what is far beyond it is none whatever the bound.
+
+        Examples
+        --------
+        >>> [round(Thresholds().beside(bound), 2) for bound in (0.5, 1.6, 1.9, 3.0)]
+        [1.5, 1.2, 1.0, 1.0]
+        """
+        if not bound < self.good_deg:
+            return self.departure_deg
+        left = math.sqrt(self.good_deg**2 - bound**2)
+        return min(max(left, self.departure_deg), _DRIFTS * self.departure_deg)

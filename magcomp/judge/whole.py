@@ -25,9 +25,6 @@ _TOO_FEW_FOR_A_LINE = 2
 _ANEW_MGAUSS = 20.0
 """Offsets that jump so far were not learnt on the way."""
 
-_DRIFTS = 1.5
-"""A step of so many times the limit is no drift whatever the bound."""
-
 
 def on_earth(problem: Problem, samples: Samples, fit: MotorFit) -> Iterator[Finding]:
     """Whether strength and dip are the earth's."""
@@ -102,10 +99,7 @@ def _on_two_levels(
 
 def _tolerated(departure: Departure, limits: Thresholds, bound: float) -> float:
     """Degrees a departure may have beside a bound without being spoken of."""
-    if departure.kind == "curve" or not bound < limits.good_deg:
-        return limits.departure_deg
-    left = float(np.sqrt(limits.good_deg**2 - bound**2))
-    return float(np.clip(left, limits.departure_deg, _DRIFTS * limits.departure_deg))
+    return limits.departure_deg if departure.kind == "curve" else limits.beside(bound)
 
 
 def _calibrated_anew(readings: Readings) -> str:

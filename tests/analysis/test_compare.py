@@ -101,13 +101,15 @@ def test_a_throttle_that_is_little_better_must_bound_the_heading_as_well(
 
 @pytest.mark.parametrize(
     ("left", "apart_deg", "grade"),
-    [(0.99, 2.2, Grade.MARGINAL), (0.99, 1.8, Grade.GOOD), (1.01, 9.0, Grade.GOOD)],
+    [(0.99, 1.6, Grade.MARGINAL), (0.99, 1.4, Grade.GOOD), (1.01, 9.0, Grade.GOOD)],
 )
 def test_what_throttle_explains_as_well_it_must_not_contradict_at_rest(
     left, apart_deg, grade, by_current_best
 ):
     current = by_current_best[1]
-    good = replace(current, verdict=replace(current.verdict, grade=Grade.GOOD))
+    sure = tuple(replace(row, p95=1.0) for row in current.verdict.heading_error)
+    verdict = replace(current.verdict, grade=Grade.GOOD, heading_error=sure)
+    good = replace(current, verdict=verdict)
     rival = Rival(moved_at_rest(current.fit, apart_deg), left * current.held_out)
     (found,) = doubted({CURRENT: [good]}, CURRENT, [rival])
     assert found.verdict.grade is grade
