@@ -12,6 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 FloatArray = NDArray[np.float64]
 
+_NO_HEADING = 1e-12
+"""Square of a horizontal field, in any unit, that turns no compass: a dead sensor's, or at a pole."""
+
 
 def wrap_angle(angle: ArrayLike) -> FloatArray:
     """Bring angles in radians into [−π, π).
@@ -218,7 +221,7 @@ def heading_shift(
     level = level_matrix(roll, pitch)
     shift = np.einsum("...ij,...j->...i", level, np.asarray(disturbance, float))
     still = np.einsum("...ij,...j->...i", level, np.asarray(field, float))
-    horizontal = still[..., 0] ** 2 + still[..., 1] ** 2
+    horizontal = np.maximum(still[..., 0] ** 2 + still[..., 1] ** 2, _NO_HEADING)
     return np.asarray((still[..., 1] * shift[..., 0] - still[..., 0] * shift[..., 1]) / horizontal)
 
 

@@ -179,3 +179,8 @@ def test_the_angles_of_a_quaternion_are_those_it_was_turned_by(roll, pitch, yaw)
     )
     found = angles_of([times(times(z, y), x)])[0]
     assert wrap_angle(found - [roll, pitch, yaw]) == pytest.approx(np.zeros(3), abs=1e-6)
+
+
+def test_where_no_field_is_horizontal_a_shift_is_a_number_too() -> None:
+    fields = np.array([[0.0, 0.0, 400.0], [0.0, 0.0, 0.0]])
+    assert np.isfinite(heading_shift(np.ones((2, 3)), fields, np.zeros(2), np.zeros(2))).all()
