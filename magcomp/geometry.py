@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 FloatArray = NDArray[np.float64]
 
 _NO_HEADING = 1e-12
-"""Square of a horizontal field, in any unit, that turns no compass: a dead sensor's, or at a pole."""
+"""Square of a horizontal field, in any unit, that turns no compass: a dead one's, or a pole's."""
 
 
 def wrap_angle(angle: ArrayLike) -> FloatArray:
