@@ -57,10 +57,9 @@ def right_turn(samples: Samples, earth: EarthField) -> int | None:
     every = max(1, len(samples.time) // _MOST_ROWS)
     few = samples.where(np.arange(len(samples.time)) % every == 0)
     down = few.down
-    vertical = earth.strength * np.sin(earth.dip)
     known = np.concatenate([down, *(down * part[:, None] for part in few.u.T)], axis=1)
     left = {
-        number: _left(known, np.einsum("ij,ij->i", down, few.raw @ turned.T) - vertical)
+        number: _left(known, np.einsum("ij,ij->i", down, few.raw @ turned.T) - earth.vertical)
         for number, turned in right_angles().items()
     }
     best = min(left, key=lambda number: left[number])

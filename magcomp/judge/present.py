@@ -71,8 +71,7 @@ def judge_present(
     if present is not in_force.correction:
         # Told by one quantity, it must still correct every reading as the firmware did.
         samples = replace(samples, raw=present.undo(samples.present, samples.u))
-    strength = problem.earth.strength
-    earth = (strength, strength * float(np.sin(problem.earth.dip)))
+    earth = (problem.earth.strength, problem.earth.vertical)
     left = departures(samples.present, samples.down, *earth)
     noise = max(_MAD_TO_STD * float(np.median(np.abs(left))), 0.2)
     still = is_still(samples)
