@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from magcomp.align.low_pass import low_pass
-from magcomp.model import Control, FloatArray, Series, interpolate, median, running_mean
+from magcomp.model import Control, FloatArray, Series, interpolate, least_at, median, running_mean
 
 _SHIFTS = np.arange(-0.2, 0.301, 0.02)
 _COARSE = 3
@@ -130,14 +130,7 @@ def exponent_of(reference: Series, drive: Series, shift: float) -> tuple[float, 
     def cost(power: float) -> float:
         return _regress(told, _features(then, (power,)), 0.0)[1]
 
-    low, high, step = _EXPONENTS
-    tried = {power: cost(power) for power in np.arange(low, high, step).tolist()}
-    while step > _FINE_EXPONENT:
-        step /= 2.0
-        best = min(tried, key=lambda power: tried[power])
-        tried |= {power: cost(power) for power in (best - step, best + step)}
-    best = min(tried, key=lambda power: tried[power])
-    return float(best), tried[best]
+    return least_at(cost, np.arange(*_EXPONENTS), _FINE_EXPONENT)
 
 
 class _Regressed(NamedTuple):

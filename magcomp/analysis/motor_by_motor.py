@@ -26,6 +26,7 @@ from magcomp.model import (
     MotorFit,
     Recording,
     Samples,
+    least_at,
     quantity_of,
 )
 
@@ -106,14 +107,8 @@ def _exponent(added: FloatArray, drive: FloatArray, most: float) -> float:
     def cost(exponent: float) -> float:
         return float(np.sum(nearest(added, drive**exponent)[1] ** 2))
 
-    tried = {each: cost(each) for each in np.linspace(_LEAST_EXPONENT, most, _STEPS).tolist()}
-    step = (most - _LEAST_EXPONENT) / (_STEPS - 1)
-    while step > _FINE:
-        step /= 2.0
-        best = min(tried, key=lambda each: tried[each])
-        around = (max(best - step, _LEAST_EXPONENT), min(best + step, most))
-        tried |= {each: cost(each) for each in around}
-    return float(min(tried, key=lambda each: tried[each]))
+    grid = np.linspace(_LEAST_EXPONENT, most, _STEPS)
+    return least_at(cost, grid, _FINE, _LEAST_EXPONENT, most)[0]
 
 
 def _answer(

@@ -23,7 +23,7 @@ from magcomp.model.fit import (
     unpack,
 )
 from magcomp.model.forms import AsWritten, Form
-from magcomp.model.numbers import as_floats, median, usual_steps
+from magcomp.model.numbers import as_floats, least_at, median, usual_steps
 from magcomp.model.parameters import ParameterSet
 from magcomp.model.quantity import (
     CURRENT,
@@ -108,6 +108,7 @@ __all__ = [
     "as_floats",
     "compasses_of",
     "interpolate",
+    "least_at",
     "median",
     "pack",
     "quantity_of",

@@ -1,7 +1,8 @@
-"""Numbers of a file or a frame made into numbers to reckon with; their median, and usual steps."""
+"""Numbers of a file or a frame made into numbers to reckon with; medians, steps and the least."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -61,3 +62,40 @@ def usual_steps(step: NDArray[np.float64]) -> NDArray[np.float64]:
     near = -(-len(step) // max(1, len(step) // _NEAR_STEPS))
     padded = np.append(step, np.repeat(step[-1:], -len(step) % near)).reshape(-1, near)
     return np.repeat(median(padded.T), near)[: len(step)]
+
+
+def least_at(
+    cost: Callable[[float], float],
+    grid: NDArray[np.float64],
+    fine: float,
+    low: float = -np.inf,
+    high: float = np.inf,
+) -> tuple[float, float]:
+    """Where a cost is least, and what it is there.
+
+    Parameters
+    ----------
+    cost
+        Asked on the grid, and then half a step to either side of the least, again and again.
+    grid
+        Even steps, shape (n,), at least two.
+    fine
+        The last step is no longer than this.
+    low, high
+        Nothing is asked beyond.
+
+    Examples
+    --------
+    >>> at, least = least_at(lambda x: (x - 1.3) ** 2, np.linspace(0.0, 2.0, 5), 0.01)
+    >>> round(at, 2), round(least, 3)
+    (1.3, 0.0)
+    """
+    tried = {each: cost(each) for each in grid.tolist()}
+    step = float(grid[-1] - grid[0]) / (len(grid) - 1)
+    while step > fine:
+        step /= 2.0
+        best = min(tried, key=lambda each: tried[each])
+        around = (max(best - step, low), min(best + step, high))
+        tried |= {each: cost(each) for each in around if each not in tried}
+    best = min(tried, key=lambda each: tried[each])
+    return float(best), tried[best]
