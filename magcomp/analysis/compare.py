@@ -132,7 +132,7 @@ def doubted(
     """
     if quantity_of(chosen).is_throttle:
         return tuple(judged[chosen])
-    by_throttle = rivals or [Rival(each.fit, each.held_out) for each in judged.get(THROTTLE, ())]
+    by_throttle: Sequence[Rival | Judged] = rivals or judged.get(THROTTLE, ())
     by_compass = {rival.fit.compass: rival for rival in by_throttle}
     both = [each for each in judged[chosen] if each.fit.compass in by_compass]
     left = [by_compass[each.fit.compass].held_out for each in both]
@@ -144,7 +144,7 @@ def doubted(
     )
 
 
-def _doubted(each: Judged, rival: Rival | None, limits: Thresholds) -> Judged:
+def _doubted(each: Judged, rival: Rival | Judged | None, limits: Thresholds) -> Judged:
     if each.verdict.grade is not Grade.GOOD or rival is None:
         return each
     apart = apart_at_rest(each.fit, rival.fit.correction)
