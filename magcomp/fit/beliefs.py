@@ -26,7 +26,16 @@ from magcomp.fit.flight import (
     prior,
 )
 from magcomp.fit.robust import Prior
-from magcomp.fit.wander import Posterior, Reduced, Rows, likeliest, mixed, posterior, weighed
+from magcomp.fit.wander import (
+    Posterior,
+    Reduced,
+    Rows,
+    evidence,
+    likeliest,
+    mixed,
+    posterior,
+    weighed,
+)
 from magcomp.model import OFFSET, SOFT_IRON, FloatArray
 
 _BELIEFS = (
@@ -65,14 +74,17 @@ def with_wander(problem: Problem, found: FlightEstimate, free: int) -> tuple[Fli
         (groups, _believed(problem, offset, soft_iron, is_open=groups == len(GROUPS)), share)
         for groups, offset, soft_iron, share in (_BELIEFS if calibrated else _BELIEFS[:1])
     ]
-    first = part_at(found.parameters)
-    wander = likeliest(first, beliefs[0][1], found.parameters)
-    if not wander.shows:
-        # Least squares is less sensitive to a current that is wrong for seconds.
-        return found, free
+    first, at = part_at(found.parameters), found.parameters
+    wander = likeliest(first, beliefs[0][1], at)
+    if free == 1 and not wander.shows:
+        held = _believed(problem, TRUSTED_OFFSET_MGAUSS, 0.0, is_open=False)
+        moving = max(evidence(first, wander, known, at) for _, known, _ in beliefs)
+        if evidence(first, wander, held, at) > moving:
+            # Least squares is less sensitive to a current that is wrong for seconds.
+            return found, free
     each: dict[int, Posterior] = {}
     for groups, known, share in beliefs:
-        one = posterior(part_at, found.parameters, known, is_physical, wander, first)
+        one = posterior(part_at, at, known, is_physical, wander, first)
         if one is not None:
             each[groups] = replace(one, evidence=one.evidence + float(np.log(share)))
     if not each:
@@ -81,10 +93,6 @@ def with_wander(problem: Problem, found: FlightEstimate, free: int) -> tuple[Fli
     likely = max(each, key=lambda groups: each[groups].evidence)
     if not is_physical(answer.parameters):
         answer = each[likely]
-    if not wander.is_clear:
-        # Near the border neither answer is best: where they differ is what is not known.
-        rival = Posterior(found.parameters, found.covariance, answer.evidence, wander)
-        answer = mixed((answer, rival))
     covariance = _SIZES_UNKNOWN**2 * answer.covariance
     moved = 1 if likely == 1 else len(GROUPS)
     return replace(found, parameters=answer.parameters, covariance=covariance), moved

@@ -35,7 +35,6 @@ _TRIED: Mapping[str, tuple[float, ...]] = {
 _ROUNDS = 8
 _NEGLIGIBLE = 0.5
 _LEAST_TILT_RAD, _LEAST_DRIFT_MGAUSS = np.radians(0.12), 0.5
-_CLEAR_DRIFT_MGAUSS = 1.0
 _LOSS_SCALE = 4.0
 _STEPS = 4
 
@@ -65,11 +64,6 @@ class Wander:
     def shows(self) -> bool:
         """Whether there is any to speak of."""
         return self.tilt_rad > _LEAST_TILT_RAD or self.drift_mgauss > _LEAST_DRIFT_MGAUSS
-
-    @property
-    def is_clear(self) -> bool:
-        """Whether there is so much that a model without it is no rival."""
-        return self.tilt_rad > _LEAST_TILT_RAD or self.drift_mgauss > _CLEAR_DRIFT_MGAUSS
 
     def neighbours(self) -> Iterator[Wander]:
         """The same with one number at the next smaller or larger of the values tried."""
@@ -263,7 +257,7 @@ def likeliest(part: Reduced, prior: Prior, at: FloatArray) -> Wander:
 
     def score(tried: Wander) -> float:
         if tried not in scores:
-            scores[tried] = _evidence(*marginal(part, tried), prior, at)
+            scores[tried] = evidence(part, tried, prior, at)
         return scores[tried]
 
     best = Wander()
@@ -287,6 +281,23 @@ def _normal(
     matrix = information[:-1, :-1][np.ix_(moving, moving)] + np.diag(precision)
     gradient = information[:-1, -1][moving] + pull
     return matrix, gradient, float(information[-1, -1] + (at - prior.mean)[moving] @ pull)
+
+
+def evidence(part: Reduced, wander: Wander, prior: Prior, at: FloatArray) -> float:
+    """Logarithm of how likely a prior makes the data, as linear around ``at`` as they are.
+
+    Parameters
+    ----------
+    part
+        The readings at ``at``.
+    wander
+        The processes.
+    prior
+        Means and widths.
+    at
+        Near the solution, shape (SIZE,).
+    """
+    return _evidence(*marginal(part, wander), prior, at)
 
 
 def _evidence(information: FloatArray, loss: float, prior: Prior, at: FloatArray) -> float:

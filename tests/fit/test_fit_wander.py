@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from synthetic import Flown
 
-from magcomp.fit import beliefs
 from magcomp.fit.field_model import SIZE, TILT
-from magcomp.fit.flight import estimate
 from magcomp.fit.robust import Prior
 from magcomp.fit.wander import (
     STATES,
@@ -135,19 +132,3 @@ def test_a_mixture_leans_on_the_evidence_and_holds_what_lies_apart():
     assert np.allclose(np.diag(found.covariance), 2.0)
     sure = mixed([one, Posterior(np.full(SIZE, 2.0), np.eye(SIZE), -20.0, WANDER)])
     assert np.allclose(sure.parameters, 0.0, atol=1e-6)
-
-
-@pytest.mark.parametrize(("drift", "rivals"), [(0.2, 0), (0.6, 1), (3.0, 2)])
-def test_near_the_border_both_answers_count(monkeypatch, drift, rivals):
-    """Hardly any drift: least squares. Much: marginal. Between: halfway, and as wide apart."""
-    problem = Flown(seed=1, seconds=60.0).problem()
-    least = estimate(problem, 1)
-    shown = Wander(drift_mgauss=drift)
-    monkeypatch.setattr(beliefs, "likeliest", lambda *_: shown)
-    far = Posterior(least.parameters + 1.0, least.covariance, 0.0, shown)
-    monkeypatch.setattr(beliefs, "posterior", lambda *_: far)
-    found, _ = beliefs.with_wander(problem, least, 1)
-    apart = (found.parameters - least.parameters)[OFFSET]
-    assert np.allclose(apart, rivals / 2.0)
-    wider = np.diag(found.covariance - beliefs._SIZES_UNKNOWN**2 * least.covariance)[OFFSET]
-    assert np.all(wider > 0.2) == (rivals == 1)
