@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from magcomp.errors import FitRejectedError, MissingDataError, UsageError
-from magcomp.fit.beliefs import with_wander
+from magcomp.fit.beliefs import wander_beside, with_wander
 from magcomp.fit.combine import still_rows, with_sweep
 from magcomp.fit.field_model import (
     FIELD_LAG,
@@ -32,7 +32,13 @@ from magcomp.fit.flight import (
     near,
 )
 from magcomp.fit.freedom import MOST_FREE, QUICK, choose_freedom
-from magcomp.fit.levels import centres_of_flight, fit_levels, usable_levels, with_line
+from magcomp.fit.levels import (
+    centres_of_flight,
+    drift_of_centres,
+    fit_levels,
+    usable_levels,
+    with_line,
+)
 from magcomp.fit.motors import alike_where_unseen, differences_of, no_surer_than
 from magcomp.fit.residual import residuals
 from magcomp.fit.sweep import fit_sweep, is_still
@@ -41,15 +47,20 @@ from magcomp.model import (
     OFFSET,
     BoolArray,
     FloatArray,
+    IntArray,
     Lags,
     MotorFit,
     Readings,
+    Samples,
 )
 
 METHODS = ("auto", "sweep", "levels", "flight")
 
 CERTAIN_MGAUSS = 0.5
 """A tenth of a degree of heading: which of two centres is known better does not matter below."""
+
+CLEARLY_SURER = 1.5
+"""Of two answers about as sure, the one that needs no attitude stands."""
 
 LEAST_READINGS = 60
 
@@ -97,7 +108,7 @@ def fit(problem: Problem, method: str = "auto") -> MotorFit:
         rows, level = usable_levels(problem)
         count = len(np.unique(level))
         if count >= 2 and (method == "levels" or len(rows) > 0.4 * len(samples)):
-            found = _with_lags(problem, fit_levels(problem, rows, level)[0])
+            found = _drifting(problem, rows, level)
             if method == "levels" or _doubt_of_centre(found) <= CERTAIN_MGAUSS:
                 return found
             return _surer(found, fit_flight(problem))
@@ -151,7 +162,7 @@ def _surer(by_levels: MotorFit, by_flight: MotorFit) -> MotorFit:
 
     Turns that hardly cover each level leave its ellipsoid's centre free; gravity then tells more.
     """
-    if _doubt_of_centre(by_levels) <= _doubt_of_centre(by_flight):
+    if _doubt_of_centre(by_levels) <= CLEARLY_SURER * _doubt_of_centre(by_flight):
         return by_levels
     why = "gravity tells more of this log than the turns at steady levels alone"
     return replace(by_flight, why=f"{why}; {by_flight.why}")
@@ -165,6 +176,17 @@ def _doubt_of_centre(fit: MotorFit) -> float:
         shift = np.hstack([u * np.eye(3), fit.correction.soft_iron])
         doubts.append(float(np.sqrt(np.trace(shift @ of_parameters @ shift.T))))
     return max(doubts)
+
+
+def _drifting(problem: Problem, rows: Samples, level: IntArray) -> MotorFit:
+    """The levels' fit with lags, and with what the sensor drifts from level to level."""
+    bare, ellipsoids = fit_levels(problem, rows, level)
+    bare = _with_lags(problem, bare)
+    samples = problem.sample(bare.lags)
+    turned = samples.where(np.isin(samples.time, rows.time))
+    drift = drift_of_centres(rows.time, level, wander_beside(turned, bare, problem))
+    found = fit_levels(problem, rows, level, start=ellipsoids, drift=drift)[0]
+    return replace(found, lags=bare.lags, lags_std=bare.lags_std, vertical=bare.vertical)
 
 
 def _with_lags(problem: Problem, fit: MotorFit) -> MotorFit:

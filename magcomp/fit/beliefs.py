@@ -10,7 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from magcomp.fit.field_model import lags_of, rows_of
+from magcomp.fit.control_noise import Noise
+from magcomp.fit.field_model import lags_of, parameters_of, rows_of
 from magcomp.fit.flight import (
     GROUPS,
     OPEN_OFFSET_MGAUSS,
@@ -30,13 +31,14 @@ from magcomp.fit.wander import (
     Posterior,
     Reduced,
     Rows,
+    Wander,
     evidence,
     likeliest,
     mixed,
     posterior,
     weighed,
 )
-from magcomp.model import OFFSET, SOFT_IRON, FloatArray
+from magcomp.model import OFFSET, SOFT_IRON, FloatArray, MotorFit, Samples
 
 _BELIEFS = (
     (4, OPEN_OFFSET_MGAUSS, OPEN_SOFT_IRON, 1.0),
@@ -65,9 +67,7 @@ def with_wander(problem: Problem, found: FlightEstimate, free: int) -> tuple[Fli
     """
 
     def part_at(parameters: FloatArray) -> Reduced:
-        samples = problem.sample(lags_of(parameters))
-        values, slopes, pulls = rows_of(samples, parameters, found.errors)
-        return weighed(Rows(samples.time, values, slopes, pulls * float(np.std(samples.total))))
+        return _part(problem.sample(lags_of(parameters)), parameters, found.errors)
 
     calibrated = is_calibrated(problem.readings.in_force[-1].correction)
     beliefs = [
@@ -96,6 +96,25 @@ def with_wander(problem: Problem, found: FlightEstimate, free: int) -> tuple[Fli
     covariance = _SIZES_UNKNOWN**2 * answer.covariance
     moved = 1 if likely == 1 else len(GROUPS)
     return replace(found, parameters=answer.parameters, covariance=covariance), moved
+
+
+def wander_beside(samples: Samples, fit: MotorFit, problem: Problem) -> Wander:
+    """What wanders and drifts beside a fit that was made without it.
+
+    Parameters
+    ----------
+    samples
+        Readings at the fit's lags.
+    fit, problem
+        What was found, and in what.
+    """
+    at = parameters_of(fit, fit.lags)
+    return likeliest(_part(samples, at, None), prior(problem, len(GROUPS)), at)
+
+
+def _part(samples: Samples, parameters: FloatArray, errors: Noise | None) -> Reduced:
+    values, slopes, pulls = rows_of(samples, parameters, errors)
+    return weighed(Rows(samples.time, values, slopes, pulls * float(np.std(samples.total))))
 
 
 def _believed(problem: Problem, offset: float, soft_iron: float, *, is_open: bool) -> Prior:

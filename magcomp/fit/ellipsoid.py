@@ -7,7 +7,7 @@ else; several levels of the control quantity share D and have a centre each.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -48,6 +48,12 @@ class Ellipsoids:
         """Covariance of one centre, mGauss², shape (3, 3)."""
         first = _SHAPE + 3 * level
         return self.covariance[first : first + 3, first : first + 3]
+
+    def drifting(self, shared: FloatArray) -> Ellipsoids:
+        """The same with centres that drifted, by a covariance alike on each axis, shape (k, k)."""
+        covariance = self.covariance.copy()
+        covariance[_SHAPE:, _SHAPE:] += np.kron(shared, np.eye(3))
+        return replace(self, covariance=covariance)
 
 
 def fit_ellipsoid(raw: FloatArray, strength: float) -> Ellipsoids:

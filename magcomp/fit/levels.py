@@ -19,6 +19,7 @@ from magcomp.fit.line import line_through
 from magcomp.fit.residual import departures
 from magcomp.fit.robust import time_blocks
 from magcomp.fit.steady import steady_levels
+from magcomp.fit.wander import Wander
 from magcomp.model import (
     CORRECTION_SIZE,
     MOTOR,
@@ -41,6 +42,7 @@ LEAST_COVERAGE = 0.03
 about one axis."""
 
 _U_FLOOR = 1e-3
+_MOST_TIMES = 200
 _LEAST_IN_BIN = 20
 
 
@@ -70,7 +72,12 @@ def _covered(samples: Samples, rows: BoolArray) -> bool:
 
 
 def fit_levels(
-    problem: Problem, samples: Samples, level: IntArray, *, start: Ellipsoids | None = None
+    problem: Problem,
+    samples: Samples,
+    level: IntArray,
+    *,
+    start: Ellipsoids | None = None,
+    drift: FloatArray | None = None,
 ) -> tuple[MotorFit, Ellipsoids]:
     """Ellipsoids of one shape, and the weighted line through their centres.
 
@@ -82,11 +89,15 @@ def fit_levels(
         From :func:`usable_levels`; at least two levels.
     start
         Where the ellipsoids begin.
+    drift
+        From :func:`drift_of_centres`; none by default.
     """
     blocks = time_blocks(samples.time, BLOCK_S)
     ellipsoids = fit_ellipsoids(
         samples.raw, level, problem.earth.strength, blocks=blocks, start=start
     )
+    if drift is not None:
+        ellipsoids = ellipsoids.drifting(drift)
     levels = tuple(
         _level(samples, level == k, ellipsoids, k) for k in range(len(ellipsoids.centres))
     )
@@ -119,6 +130,41 @@ def fit_levels(
         count=len(samples),
     )
     return fit, ellipsoids
+
+
+def drift_of_centres(time: FloatArray, level: IntArray, wander: Wander) -> FloatArray:
+    """How a sensor's drift moves the centres, mGauss², shape (k, k), alike on each axis.
+
+    Parameters
+    ----------
+    time, level
+        Of each reading, shape (n,).
+    wander
+        Size and time of the drift.
+
+    Notes
+    -----
+    The readings of a level were taken one after the other and share what the offsets had drifted
+    by; a centre is off by the mean of it (docs/method.md, Levels).
+
+    Examples
+    --------
+    Two levels, hours apart, of a second each:
+
+    >>> time, level = np.array([0.0, 1.0, 9e3, 9e3 + 1.0]), np.array([0, 0, 1, 1])
+    >>> drift_of_centres(time, level, Wander(drift_mgauss=2.0, drift_s=60.0)).round(1).tolist()
+    [[4.0, 0.0], [0.0, 4.0]]
+    """
+    count = int(level.max()) + 1
+    when = [
+        time[level == k][:: -(-np.count_nonzero(level == k) // _MOST_TIMES)] for k in range(count)
+    ]
+    shared = np.empty((count, count))
+    for i in range(count):
+        for j in range(count):
+            apart = np.abs(when[i][:, None] - when[j])
+            shared[i, j] = np.mean(np.exp(-apart / wander.drift_s))
+    return np.asarray(wander.drift_mgauss**2 * shared)
 
 
 def _level(samples: Samples, rows: BoolArray, ellipsoids: Ellipsoids, index: int) -> Level:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import accumulate
 
 import numpy as np
 import pytest
@@ -11,7 +12,18 @@ from synthetic import EXACT, INTERFERENCE, Flown, Turned, problem_of
 
 from magcomp.errors import FitRejectedError
 from magcomp.fit import fit
-from magcomp.model import MOTOR, Lags, MotorFit, Series, pack
+from magcomp.fit.levels import drift_of_centres, fit_levels, usable_levels
+from magcomp.fit.wander import Wander
+from magcomp.model import (
+    MOTOR,
+    OFFSET,
+    FloatArray,
+    Lags,
+    MotorFit,
+    Recording,
+    Series,
+    pack,
+)
 
 UNCALIBRATED = {"COMPASS_MOTCT": 0.0}
 RIG = {"in_force": UNCALIBRATED, "noise": 1.5}
@@ -148,3 +160,43 @@ def test_samples_of_unsteady_current_belong_to_no_level():
     assert len(problem.sample(Lags())) > 0
     with pytest.raises(FitRejectedError):
         fit(problem, "levels")
+
+
+def drifting(
+    recording: Recording, seed: int, size: float = 1.5, memory_s: float = 60.0
+) -> Recording:
+    """The same recording of a sensor whose offsets drift: a first-order Gauss–Markov process."""
+    rng = np.random.default_rng([seed, 9])
+    field = recording.field[1]
+    kept = np.exp(-np.diff(field.time, prepend=-np.inf) / memory_s)[:, None]
+    news = rng.normal(size=field.value.shape) * size * np.sqrt(1.0 - kept**2)
+    drift = np.array(list(accumulate(zip(kept, news, strict=True), _next, initial=np.zeros(3))))
+    return replace(recording, field={1: Series(field.time, field.value + drift[1:])})
+
+
+def _next(before: FloatArray, now: tuple[FloatArray, FloatArray]) -> FloatArray:
+    kept, news = now
+    return kept * before + news
+
+
+def test_the_covariance_holds_what_a_sensor_drifts_from_level_to_level():
+    weights = []
+    for seed in range(10):
+        recording = drifting(Turned(seed=seed, **RIG).recording(), seed)
+        found = fit(problem_of(recording), "levels")
+        error = (pack(found.correction) - pack(EXACT))[OFFSET]
+        weights.append(np.mean(error**2 / np.diag(found.covariance)[OFFSET]))
+    assert 0.3 < np.mean(weights) < 2.5
+
+
+def test_without_drift_the_covariance_of_centres_stays_that_of_the_noise():
+    still, moved = Wander(drift_mgauss=0.2), Wander(drift_mgauss=3.0)
+    problem = Turned(seed=1, **RIG).problem()
+    rows, level = usable_levels(problem)
+    least, more = (
+        fit_levels(problem, rows, level, drift=drift_of_centres(rows.time, level, each))[0]
+        for each in (still, moved)
+    )
+    assert np.allclose(pack(least.correction), pack(more.correction), rtol=1e-2, atol=0.5)
+    of_offset = [np.diag(each.covariance)[OFFSET].mean() for each in (least, more)]
+    assert of_offset[1] > 3.0 * of_offset[0]
