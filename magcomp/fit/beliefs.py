@@ -29,14 +29,15 @@ from magcomp.fit.flight import (
 from magcomp.fit.robust import Prior
 from magcomp.fit.wander import (
     Posterior,
-    Reduced,
     Rows,
     Wander,
-    evidence,
+    evidences,
     likeliest,
     mixed,
     posterior,
+    reduced,
     weighed,
+    weights_and_rest,
 )
 from magcomp.model import OFFSET, SOFT_IRON, FloatArray, MotorFit, Samples
 
@@ -66,25 +67,31 @@ def with_wander(problem: Problem, found: FlightEstimate, free: int) -> tuple[Fli
         The groups that were open in it; they stand where no marginal solution is possible.
     """
 
-    def part_at(parameters: FloatArray) -> Reduced:
-        return _part(problem.sample(lags_of(parameters)), parameters, found.errors)
+    def rows_at(parameters: FloatArray) -> Rows:
+        return _rows(problem.sample(lags_of(parameters)), parameters, found.errors)
 
+    at = found.parameters
+    rows = rows_at(at)
+    # Weights made anew from each belief's own residuals would be no common measure of beliefs.
+    weights = weights_and_rest(rows.time, rows.values)[0]
+    first = reduced(rows, weights)
     calibrated = is_calibrated(problem.readings.in_force[-1].correction)
     beliefs = [
         (groups, _believed(problem, offset, soft_iron, is_open=groups == len(GROUPS)), share)
         for groups, offset, soft_iron, share in (_BELIEFS if calibrated else _BELIEFS[:1])
     ]
-    first, at = part_at(found.parameters), found.parameters
     wander = likeliest(first, beliefs[0][1], at)
     if free == 1 and not wander.shows:
         held = _believed(problem, TRUSTED_OFFSET_MGAUSS, 0.0, is_open=False)
-        moving = max(evidence(first, wander, known, at) for _, known, _ in beliefs)
-        if evidence(first, wander, held, at) > moving:
+        of_held, *others = evidences(first, wander, (held, *(b[1] for b in beliefs)), at)
+        if of_held > max(others):
             # Least squares is less sensitive to a current that is wrong for seconds.
             return found, free
     each: dict[int, Posterior] = {}
     for groups, known, share in beliefs:
-        one = posterior(part_at, at, known, is_physical, wander, first)
+        one = posterior(
+            lambda p: reduced(rows_at(p), weights), at, known, is_physical, wander, first
+        )
         if one is not None:
             each[groups] = replace(one, evidence=one.evidence + float(np.log(share)))
     if not each:
@@ -109,12 +116,12 @@ def wander_beside(samples: Samples, fit: MotorFit, problem: Problem) -> Wander:
         What was found, and in what.
     """
     at = parameters_of(fit, fit.lags)
-    return likeliest(_part(samples, at, None), prior(problem, len(GROUPS)), at)
+    return likeliest(weighed(_rows(samples, at, None)), prior(problem, len(GROUPS)), at)
 
 
-def _part(samples: Samples, parameters: FloatArray, errors: Noise | None) -> Reduced:
+def _rows(samples: Samples, parameters: FloatArray, errors: Noise | None) -> Rows:
     values, slopes, pulls = rows_of(samples, parameters, errors)
-    return weighed(Rows(samples.time, values, slopes, pulls * float(np.std(samples.total))))
+    return Rows(samples.time, values, slopes, pulls * float(np.std(samples.total)))
 
 
 def _believed(problem: Problem, offset: float, soft_iron: float, *, is_open: bool) -> Prior:

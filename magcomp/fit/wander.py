@@ -257,7 +257,7 @@ def likeliest(part: Reduced, prior: Prior, at: FloatArray) -> Wander:
 
     def score(tried: Wander) -> float:
         if tried not in scores:
-            scores[tried] = evidence(part, tried, prior, at)
+            scores[tried] = evidences(part, tried, (prior,), at)[0]
         return scores[tried]
 
     best = Wander()
@@ -283,8 +283,10 @@ def _normal(
     return matrix, gradient, float(information[-1, -1] + (at - prior.mean)[moving] @ pull)
 
 
-def evidence(part: Reduced, wander: Wander, prior: Prior, at: FloatArray) -> float:
-    """Logarithm of how likely a prior makes the data, as linear around ``at`` as they are.
+def evidences(
+    part: Reduced, wander: Wander, priors: Iterable[Prior], at: FloatArray
+) -> tuple[float, ...]:
+    """Logarithm of how likely each prior makes the data, as linear as they are around ``at``.
 
     Parameters
     ----------
@@ -292,12 +294,13 @@ def evidence(part: Reduced, wander: Wander, prior: Prior, at: FloatArray) -> flo
         The readings at ``at``.
     wander
         The processes.
-    prior
+    priors
         Means and widths.
     at
         Near the solution, shape (SIZE,).
     """
-    return _evidence(*marginal(part, wander), prior, at)
+    information, loss = marginal(part, wander)
+    return tuple(_evidence(information, loss, prior, at) for prior in priors)
 
 
 def _evidence(information: FloatArray, loss: float, prior: Prior, at: FloatArray) -> float:

@@ -19,11 +19,11 @@ from magcomp.fit.flight import (
     estimate,
 )
 from magcomp.fit.robust import Prior
-from magcomp.fit.wander import Posterior, Wander
+from magcomp.fit.wander import Posterior, Reduced, Rows, Wander, reduced
 from magcomp.geometry import body_from_earth, heading, wrap_angle
 from magcomp.judge import judge
 from magcomp.judge.heading_error import attitudes
-from magcomp.model import OFFSET, Correction
+from magcomp.model import OFFSET, Correction, FloatArray
 
 CALIBRATED = None
 DRIFTING = Wander(drift_mgauss=3.0)
@@ -96,6 +96,21 @@ def test_standard_errors_are_wider_for_the_sizes_that_are_estimates_themselves(m
     monkeypatch.setattr(beliefs, "posterior", lambda *_: one)
     wider = beliefs.with_wander(problem, least, 1)[0]
     assert np.allclose(wider.covariance, 1.16**2 * least.covariance)
+
+
+def test_every_belief_is_held_against_readings_of_the_same_weights(monkeypatch):
+    """Weights of its own residuals would be worth ten of log-likelihood, either way."""
+    used: list[FloatArray] = []
+
+    def recorded(rows: Rows, weights: FloatArray) -> Reduced:
+        used.append(weights)
+        return reduced(rows, weights)
+
+    monkeypatch.setattr(beliefs, "reduced", recorded)
+    monkeypatch.setattr(beliefs, "likeliest", lambda *_: DRIFTING)
+    beliefs.with_wander(*flown(CALIBRATED), 1)
+    assert len(used) > len(ALL)
+    assert all(weights is used[0] for weights in used)
 
 
 def test_least_squares_stands_where_nothing_lasts_and_nothing_is_off(monkeypatch):
