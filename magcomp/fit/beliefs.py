@@ -49,7 +49,7 @@ _BELIEFS = (
 """Groups that move, how far offsets and soft iron of the calibration in force may be off, and how
 often that is so: a calibration as good as the last is rare, and data that say little favour it."""
 
-_SIZES_UNKNOWN = 1.16
+_SIZES_UNKNOWN = 1.08
 """Standard errors are wider by this, for the sizes of what wanders are themselves estimates."""
 
 

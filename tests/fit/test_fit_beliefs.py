@@ -95,7 +95,7 @@ def test_standard_errors_are_wider_for_the_sizes_that_are_estimates_themselves(m
     monkeypatch.setattr(beliefs, "likeliest", lambda *_: DRIFTING)
     monkeypatch.setattr(beliefs, "posterior", lambda *_: one)
     wider = beliefs.with_wander(problem, least, 1)[0]
-    assert np.allclose(wider.covariance, 1.16**2 * least.covariance)
+    assert np.allclose(wider.covariance, 1.08**2 * least.covariance)
 
 
 def test_every_belief_is_held_against_readings_of_the_same_weights(monkeypatch):
