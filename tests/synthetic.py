@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import accumulate, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -280,3 +280,20 @@ def with_both(motors_follow: str, seed: int) -> Recording:
     return replace(
         plain, current=Series(time, current), throttle=Series(time, np.clip(percent / 60.0, 0, 1))
     )
+
+
+def drifting(
+    recording: Recording, seed: int, size: float = 1.5, memory_s: float = 60.0
+) -> Recording:
+    """The same recording of a sensor whose offsets drift: a first-order Gauss–Markov process."""
+    rng = np.random.default_rng([seed, 9])
+    field = recording.field[1]
+    kept = np.exp(-np.diff(field.time, prepend=-np.inf) / memory_s)[:, None]
+    news = rng.normal(size=field.value.shape) * size * np.sqrt(1.0 - kept**2)
+    drift = np.array(list(accumulate(zip(kept, news, strict=True), _next, initial=np.zeros(3))))
+    return replace(recording, field={1: Series(field.time, field.value + drift[1:])})
+
+
+def _next(before: FloatArray, now: tuple[FloatArray, FloatArray]) -> FloatArray:
+    kept, news = now
+    return kept * before + news

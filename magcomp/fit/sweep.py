@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from magcomp.errors import FitRejectedError
+from magcomp.fit.drift import covariance_of_drift
 from magcomp.fit.flight import (
     BLOCK_S,
     LAG_MEAN_S,
@@ -139,7 +140,13 @@ def fit_sweep(problem: Problem, *, lag: float | None = None) -> MotorFit:
         blocks=time_blocks(problem.readings.time, BLOCK_S / 5),
         feasible=lambda p: bool(abs(p[_LAG]) < LAG_MOST_S),
     )
-    return _answer(problem, found.parameters, found.covariance, float(np.max(found.noise)))
+    rows = problem.sample(Lags(0.0, float(found.parameters[_LAG])))
+    fitted = np.column_stack([np.ones(len(rows)), rows.u])
+    covariance = found.covariance.copy()
+    covariance[:_LAG, :_LAG] += np.kron(
+        covariance_of_drift(rows.time, found.residuals, fitted), np.eye(3)
+    )
+    return _answer(problem, found.parameters, covariance, float(np.max(found.noise)))
 
 
 def _nearest_lag(problem: Problem) -> float:

@@ -24,13 +24,15 @@ STATES = 6
 
 LEAST_STRETCH_S, MOST_STRETCHES = 1.0, 400
 
+DRIFTS_MGAUSS, DRIFTS_S = (0.2, 0.6, 1.5, 3.0, 6.0, 12.0), (20.0, 60.0, 200.0)
+
 _TRIED: Mapping[str, tuple[float, ...]] = {
     "control_share": (0.001, 0.01, 0.03, 0.08, 0.15),
     "control_s": (1.0, 3.0, 10.0, 40.0),
     "tilt_rad": tuple(np.radians((0.02, 0.05, 0.1, 0.2, 0.35, 0.6, 1.0)).tolist()),
     "tilt_s": (3.0, 10.0, 30.0, 100.0),
-    "drift_mgauss": (0.2, 0.6, 1.5, 3.0, 6.0, 12.0),
-    "drift_s": (20.0, 60.0, 200.0),
+    "drift_mgauss": DRIFTS_MGAUSS,
+    "drift_s": DRIFTS_S,
 }
 _ROUNDS = 8
 _NEGLIGIBLE = 0.5

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import accumulate
 
 import numpy as np
 import pytest
 import recordings
-from synthetic import EXACT, INTERFERENCE, Flown, Turned, problem_of
+from synthetic import EXACT, INTERFERENCE, Flown, Turned, drifting, problem_of
 
 from magcomp.errors import FitRejectedError
 from magcomp.fit import fit
@@ -17,10 +16,8 @@ from magcomp.fit.wander import Wander
 from magcomp.model import (
     MOTOR,
     OFFSET,
-    FloatArray,
     Lags,
     MotorFit,
-    Recording,
     Series,
     pack,
 )
@@ -160,23 +157,6 @@ def test_samples_of_unsteady_current_belong_to_no_level():
     assert len(problem.sample(Lags())) > 0
     with pytest.raises(FitRejectedError):
         fit(problem, "levels")
-
-
-def drifting(
-    recording: Recording, seed: int, size: float = 1.5, memory_s: float = 60.0
-) -> Recording:
-    """The same recording of a sensor whose offsets drift: a first-order Gauss–Markov process."""
-    rng = np.random.default_rng([seed, 9])
-    field = recording.field[1]
-    kept = np.exp(-np.diff(field.time, prepend=-np.inf) / memory_s)[:, None]
-    news = rng.normal(size=field.value.shape) * size * np.sqrt(1.0 - kept**2)
-    drift = np.array(list(accumulate(zip(kept, news, strict=True), _next, initial=np.zeros(3))))
-    return replace(recording, field={1: Series(field.time, field.value + drift[1:])})
-
-
-def _next(before: FloatArray, now: tuple[FloatArray, FloatArray]) -> FloatArray:
-    kept, news = now
-    return kept * before + news
 
 
 def test_the_covariance_holds_what_a_sensor_drifts_from_level_to_level():

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import recordings
-from synthetic import EXACT, INTERFERENCE, Flown, Swept, problem_of
+from synthetic import EXACT, INTERFERENCE, Flown, Swept, drifting, problem_of
 
 from magcomp.errors import FitRejectedError
 from magcomp.fit import fit, is_still
-from magcomp.model import MOTOR, Lags, Series
+from magcomp.model import MOTOR, Lags, MotorFit, Series
 
 SIZE = float(np.linalg.norm(INTERFERENCE))
 
@@ -109,3 +109,28 @@ def test_a_sweep_holds_no_turns_for_the_method_of_levels():
 def test_the_lag_of_a_sweep_in_sudden_steps_lies_within_three_standard_errors(lag):
     found = fit(Swept(current_lag=lag).problem(), "sweep")
     assert abs(found.lags.regressor - lag) < 3 * found.lags_std.regressor
+
+
+def drifted(seed: int) -> MotorFit:
+    """One slow sweep up and down of a sensor that drifts."""
+    made = Slowly(seed=seed)
+    return fit(problem_of(drifting(made.recording(), seed, size=3.0)), "sweep")
+
+
+class Slowly(Swept):
+    def current_at(self, time: np.ndarray) -> np.ndarray:
+        return 1.0 + 20.0 * np.clip(1.0 - np.abs(time / 50.0 - 1.0), 0.0, 1.0)
+
+
+def test_a_drift_that_looks_like_the_current_is_in_the_stated_error():
+    found = [drifted(seed) for seed in range(12)]
+    error = np.array([f.interference - INTERFERENCE for f in found])
+    stated = np.array([np.diag(f.covariance)[MOTOR] for f in found])
+    # From the readings and the soft iron alone it is 31.
+    assert 0.3 < np.mean(error**2 / stated) < 5.0
+
+
+def test_no_drift_is_made_of_a_current_that_is_told_late():
+    """What passes within seconds is not drift: the vector stays as sure as it is."""
+    found = fit(Swept(current_hz=1.0).problem(), "sweep")
+    assert np.sqrt(np.diag(found.covariance)[MOTOR]).max() < 0.01 * SIZE
