@@ -73,6 +73,7 @@ def sample(
         u=u,
         u_rate=_columns(_rate(control.series, commanded)),
         u_blur=_columns(interpolate(control.blurred, commanded)) - u,
+        u_slow=_columns(interpolate(control.slow, commanded)) - u,
     )
 
 

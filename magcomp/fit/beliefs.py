@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from magcomp.fit.control_noise import Noise
-from magcomp.fit.field_model import lags_of, parameters_of, rows_of
+from magcomp.fit.field_model import SLOW, lags_of, parameters_of, rows_of
 from magcomp.fit.flight import (
     GROUPS,
     OPEN_OFFSET_MGAUSS,
@@ -51,6 +51,10 @@ often that is so: a calibration as good as the last is rare, and data that say l
 
 _SIZES_UNKNOWN = 1.08
 """Standard errors are wider by this, for the sizes of what wanders are themselves estimates."""
+
+_SLOW_WIDTH = 0.1
+"""Monitors smooth, and a quantity told seldom or rebuilt is flat: what varies within seconds may be
+larger or smaller than told by about this share."""
 
 
 def with_wander(problem: Problem, found: FlightEstimate, free: int) -> tuple[FlightEstimate, int]:
@@ -128,5 +132,5 @@ def _believed(problem: Problem, offset: float, soft_iron: float, *, is_open: boo
     """The prior of a calibration that is off by so much, everything open."""
     known = prior(problem, len(GROUPS) if is_open else 1)
     width = known.width.copy()
-    width[OFFSET], width[SOFT_IRON] = offset, soft_iron
+    width[OFFSET], width[SOFT_IRON], width[SLOW] = offset, soft_iron, _SLOW_WIDTH
     return Prior(known.mean, width)

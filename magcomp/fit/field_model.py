@@ -31,8 +31,9 @@ LAGS = slice(FIELD_LAG, APPLIED_LAG + 1)
 TILT = slice(LAGS.stop, LAGS.stop + 2)
 LEAN = slice(TILT.stop, TILT.stop + 2 * len(LEANS_S))
 BLUR = LEAN.stop
-NUISANCE = slice(TILT.start, BLUR + 1)
-SIZE = BLUR + 1
+SLOW = BLUR + 1
+NUISANCE = slice(TILT.start, SLOW + 1)
+SIZE = SLOW + 1
 """Parameters where the control quantity has one part; other parts' motor vectors follow."""
 
 DIAGONAL, OFF_DIAGONAL = slice(6, 9), slice(9, 12)
@@ -129,6 +130,7 @@ def _columns(samples: Samples, parameters: FloatArray) -> FloatArray:
     for place, start in enumerate(range(LEAN.start, LEAN.stop, 2)):
         slopes[start : start + 2] = slopes[TILT] * lean[2 * place : 2 * place + 2, None]
     slopes[BLUR] = _dot(pulled, _across(correction.added(samples.u_blur))[:, None])
+    slopes[SLOW] = _dot(pulled, _across(correction.added(samples.u_slow))[:, None])
     columns[0] = _dot(axes, (inverse @ (corrected - earth))[:, None])
     columns[0] += np.tensordot(parameters[NUISANCE], slopes[NUISANCE], axes=1)
     columns[1] = np.tensordot(correction.vector, pulled, axes=1)

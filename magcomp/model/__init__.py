@@ -54,6 +54,7 @@ from magcomp.model.recording import (
 )
 from magcomp.model.samples import (
     LEANS_S,
+    SLOW_S,
     Control,
     Correction,
     InForce,
@@ -71,6 +72,7 @@ __all__ = [
     "MOTORS",
     "OFFSET",
     "QUANTITIES",
+    "SLOW_S",
     "SOFT_IRON",
     "SPEED_CONTROLLERS",
     "THROTTLE",

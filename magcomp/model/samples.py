@@ -20,6 +20,9 @@ from magcomp.model.recording import (
 BLUR_S = 0.2
 """A reading is a mean over a tenth of a second, and motors follow their outputs within two."""
 
+SLOW_S = 2.0
+"""What varies within this is told with another gain than what lasts."""
+
 LEANS_S = (2.0, 8.0)
 """How soon a lean that is held shows in the attitude: between these, for most filters."""
 
@@ -135,6 +138,11 @@ class Control:
     def blurred(self) -> Series:
         """Its mean over :data:`BLUR_S` before and after each moment."""
         return running_mean(self.series, BLUR_S)
+
+    @cached_property
+    def slow(self) -> Series:
+        """Its mean over :data:`SLOW_S` before and after each moment."""
+        return running_mean(self.series, SLOW_S)
 
     @property
     def parts(self) -> int:
@@ -281,6 +289,8 @@ class Samples:
         Their change per second, shape (n, k).
     u_blur
         What :attr:`Control.blurred` differs from them by, shape (n, k).
+    u_slow
+        What :attr:`Control.slow` differs from them by, shape (n, k).
     """
 
     compass: int
@@ -296,6 +306,7 @@ class Samples:
     u: FloatArray
     u_rate: FloatArray
     u_blur: FloatArray
+    u_slow: FloatArray
 
     def __len__(self) -> int:
         return len(self.time)
