@@ -109,9 +109,10 @@ def fit(problem: Problem, method: str = "auto") -> MotorFit:
         count = len(np.unique(level))
         if count >= 2 and (method == "levels" or len(rows) > 0.4 * len(samples)):
             found = _drifting(problem, rows, level)
-            if method == "levels" or _doubt_of_centre(found) <= CERTAIN_MGAUSS:
+            top = float(np.quantile(samples.total, 0.98))
+            if method == "levels" or _doubt_of_centre(found, top) <= CERTAIN_MGAUSS:
                 return found
-            return _surer(found, fit_flight(problem))
+            return _surer(found, fit_flight(problem), top)
         if method == "levels":
             raise FitRejectedError(
                 "The method of levels needs turns about all axes at two or more steady levels of "
@@ -157,22 +158,25 @@ def refit(problem: Problem, fit: MotorFit, keep: BoolArray) -> MotorFit:
     return _updated(fit, near(part, _groups(fit), parameters_of(fit, fit.lags)))
 
 
-def _surer(by_levels: MotorFit, by_flight: MotorFit) -> MotorFit:
+def _surer(by_levels: MotorFit, by_flight: MotorFit, top: float) -> MotorFit:
     """Of two fits the one whose centre is better known where it is known least.
 
     Turns that hardly cover each level leave its ellipsoid's centre free; gravity then tells more.
     """
-    if _doubt_of_centre(by_levels) <= CLEARLY_SURER * _doubt_of_centre(by_flight):
+    if _doubt_of_centre(by_levels, top) <= CLEARLY_SURER * _doubt_of_centre(by_flight, top):
         return by_levels
     why = "gravity tells more of this log than the turns at steady levels alone"
     return replace(by_flight, why=f"{why}; {by_flight.why}")
 
 
-def _doubt_of_centre(fit: MotorFit) -> float:
-    """Standard error of the field's shift, mGauss, at rest or at the top, whichever is larger."""
+def _doubt_of_centre(fit: MotorFit, top: float) -> float:
+    """Standard error of the field's shift, mGauss, at rest or at the top, whichever is larger.
+
+    The top is the recording's: levels may have been held up to a part of it only.
+    """
     of_parameters = fit.covariance[: OFFSET.stop, : OFFSET.stop]
     doubts = []
-    for u in (0.0, fit.u_high):
+    for u in (0.0, top):
         shift = np.hstack([u * np.eye(3), fit.correction.soft_iron])
         doubts.append(float(np.sqrt(np.trace(shift @ of_parameters @ shift.T))))
     return max(doubts)

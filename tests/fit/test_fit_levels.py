@@ -180,3 +180,20 @@ def test_without_drift_the_covariance_of_centres_stays_that_of_the_noise():
     assert np.allclose(pack(least.correction), pack(more.correction), rtol=1e-2, atol=0.5)
     of_offset = [np.diag(each.covariance)[OFFSET].mean() for each in (least, more)]
     assert of_offset[1] > 3.0 * of_offset[0]
+
+
+class Partly(Turned):
+    """Two low levels held, and then a flight at a multiple of them."""
+
+    def current_at(self, time):
+        until = 0.7 * self.seconds
+        held = np.where(time < until / 2.0, *self.levels)
+        wave = np.sin(time / 2.1) + np.sin(time / 5.3)
+        return np.where(time < until, held, 32.0 + 6.0 * wave)
+
+
+def test_levels_held_at_a_part_of_the_current_are_not_taken_for_sure_at_the_top():
+    made = Partly(seed=1, seconds=300.0, levels=(1.0, 8.0), **RIG)
+    found = fit(problem_of(made.recording()), "auto")
+    assert len(usable_levels(made.problem())[0]) > 0.4 * len(made.problem().readings)
+    assert found.method == "flight"
