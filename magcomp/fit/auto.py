@@ -148,7 +148,7 @@ def refit(problem: Problem, fit: MotorFit, keep: BoolArray) -> MotorFit:
     """
     part = problem.where(keep)
     if fit.method == "sweep":
-        return fit_sweep(part, lag=fit.lags.regressor)
+        return fit_sweep(part, lag=fit.lags.regressor, drifts=False)
     if fit.method == "levels":
         rows, level = usable_levels(part)
         if len(np.unique(level)) < 2:
@@ -312,5 +312,5 @@ def best_form(problems: Sequence[Problem]) -> Problem:
     if len(problems) == 1:
         return problems[0]
     if is_still(problems[0].sample(Lags())):
-        return min(problems, key=lambda p: fit_sweep(p).noise)
+        return min(problems, key=lambda p: fit_sweep(p, drifts=False).noise)
     return min(problems, key=lambda p: estimate(p, MOST_FREE, with_covariance=False).cost)

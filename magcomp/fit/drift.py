@@ -17,7 +17,7 @@ from magcomp.model import FloatArray
 PASSING_MGAUSS, PASSING_S = (0.3, 0.6, 1.2, 2.5, 5.0, 10.0), (0.3, 1.0, 3.0)
 """Errors of a current that steps, as large as these in the field and as long."""
 
-_MOST_BINS = 150
+_MOST_BINS = 80
 
 
 def covariance_of_drift(time: FloatArray, left: FloatArray, design: FloatArray) -> FloatArray:

@@ -86,7 +86,7 @@ def from_block_mean(values: FloatArray, block: IntArray) -> FloatArray:
     return np.asarray(values - mean[block])
 
 
-def fit_sweep(problem: Problem, *, lag: float | None = None) -> MotorFit:
+def fit_sweep(problem: Problem, *, lag: float | None = None, drifts: bool = True) -> MotorFit:
     """Raw field = constant + slope · u(t − lag), robustly; MOT = −D · slope.
 
     Parameters
@@ -95,6 +95,8 @@ def fit_sweep(problem: Problem, *, lag: float | None = None) -> MotorFit:
         The compass and its control quantity.
     lag
         The regressor's lag where it is known; estimated otherwise.
+    drifts
+        Whether the covariance is to hold the sensor's drift; nobody asks for it in a search.
 
     Raises
     ------
@@ -140,12 +142,12 @@ def fit_sweep(problem: Problem, *, lag: float | None = None) -> MotorFit:
         blocks=time_blocks(problem.readings.time, BLOCK_S / 5),
         feasible=lambda p: bool(abs(p[_LAG]) < LAG_MOST_S),
     )
-    rows = problem.sample(Lags(0.0, float(found.parameters[_LAG])))
-    fitted = np.column_stack([np.ones(len(rows)), rows.u])
     covariance = found.covariance.copy()
-    covariance[:_LAG, :_LAG] += np.kron(
-        covariance_of_drift(rows.time, found.residuals, fitted), np.eye(3)
-    )
+    if drifts:
+        rows = problem.sample(Lags(0.0, float(found.parameters[_LAG])))
+        fitted = np.column_stack([np.ones(len(rows)), rows.u])
+        drift = covariance_of_drift(rows.time, found.residuals, fitted)
+        covariance[:_LAG, :_LAG] += np.kron(drift, np.eye(3))
     return _answer(problem, found.parameters, covariance, float(np.max(found.noise)))
 
 
