@@ -36,6 +36,7 @@ from magcomp.fit.levels import (
     centres_of_flight,
     drift_of_centres,
     fit_levels,
+    through_centres,
     usable_levels,
     with_line,
 )
@@ -189,7 +190,7 @@ def _drifting(problem: Problem, rows: Samples, level: IntArray) -> MotorFit:
     samples = problem.sample(bare.lags)
     turned = samples.where(np.isin(samples.time, rows.time))
     drift = drift_of_centres(rows.time, level, wander_beside(turned, bare, problem))
-    found = fit_levels(problem, rows, level, start=ellipsoids, drift=drift)[0]
+    found = through_centres(problem, rows, level, ellipsoids.drifting(drift))
     return replace(found, lags=bare.lags, lags_std=bare.lags_std, vertical=bare.vertical)
 
 

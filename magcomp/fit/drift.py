@@ -35,7 +35,7 @@ def covariance_of_drift(time: FloatArray, left: FloatArray, design: FloatArray) 
     Returns
     -------
     ndarray, shape (k, k)
-        For each axis alike; nothing where no drift makes the residuals likelier.
+        For each axis alike; next to nothing where no drift makes the residuals likelier.
 
     Notes
     -----

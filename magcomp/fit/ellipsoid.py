@@ -75,7 +75,6 @@ def fit_ellipsoids(
     strength: float,
     *,
     blocks: IntArray | None = None,
-    start: Ellipsoids | None = None,
 ) -> Ellipsoids:
     """Robust ellipsoids of one shape through the readings of several levels.
 
@@ -89,8 +88,6 @@ def fit_ellipsoids(
         Earth field strength, mGauss: sets the scale of D.
     blocks
         Block in time of each reading, shape (n,), ascending; each its own by default.
-    start
-        Where to begin; a sphere per level by default.
 
     Raises
     ------
@@ -108,7 +105,7 @@ def fit_ellipsoids(
             f"An ellipsoid needs readings from all round; instead half of them lie within "
             f"{moved:.3g} mGauss of one point"
         )
-    begin = _spheres(raw, level, count, strength) if start is None else _packed(start)
+    begin = _spheres(raw, level, count, strength)
     rows = np.arange(len(raw))
     columns = _SHAPE + 3 * level
 
@@ -147,11 +144,6 @@ def fit_ellipsoids(
 def _widths(count: int, strength: float) -> FloatArray:
     """Wide enough not to be felt, narrow enough to keep an unseen direction from running away."""
     return np.concatenate([np.full(_SHAPE, 0.5), np.full(3 * count, 3.0 * strength)])
-
-
-def _packed(ellipsoids: Ellipsoids) -> FloatArray:
-    shape = ellipsoids.soft_iron[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
-    return np.concatenate([shape, ellipsoids.centres.reshape(-1)])
 
 
 def _is_ellipsoid(parameters: FloatArray) -> bool:

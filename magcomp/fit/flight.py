@@ -186,8 +186,7 @@ def prior(problem: Problem, free: int) -> Prior:
     width[STRENGTH] = (1e-4 if free >= 3 else SCALE_WIDTH) * earth.strength
     width[SIN_DIP] = DIP_WIDTH
     width[LAGS] = LAG_WIDTH_S
-    width[TILT], width[LEAN] = TILT_WIDTH_RAD, LEAN_WIDTH
-    width[BLUR] = BLUR_WIDTH
+    width[TILT], width[LEAN], width[BLUR] = TILT_WIDTH_RAD, LEAN_WIDTH, BLUR_WIDTH
     return Prior(mean, width)
 
 

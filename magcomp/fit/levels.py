@@ -71,14 +71,7 @@ def _covered(samples: Samples, rows: BoolArray) -> bool:
     return bool(np.linalg.eigvalsh(down.T @ down / len(down))[0] > LEAST_COVERAGE)
 
 
-def fit_levels(
-    problem: Problem,
-    samples: Samples,
-    level: IntArray,
-    *,
-    start: Ellipsoids | None = None,
-    drift: FloatArray | None = None,
-) -> tuple[MotorFit, Ellipsoids]:
+def fit_levels(problem: Problem, samples: Samples, level: IntArray) -> tuple[MotorFit, Ellipsoids]:
     """Ellipsoids of one shape, and the weighted line through their centres.
 
     Parameters
@@ -87,17 +80,24 @@ def fit_levels(
         The compass and its control quantity.
     samples, level
         From :func:`usable_levels`; at least two levels.
-    start
-        Where the ellipsoids begin.
-    drift
-        From :func:`drift_of_centres`; none by default.
     """
     blocks = time_blocks(samples.time, BLOCK_S)
-    ellipsoids = fit_ellipsoids(
-        samples.raw, level, problem.earth.strength, blocks=blocks, start=start
-    )
-    if drift is not None:
-        ellipsoids = ellipsoids.drifting(drift)
+    ellipsoids = fit_ellipsoids(samples.raw, level, problem.earth.strength, blocks=blocks)
+    return through_centres(problem, samples, level, ellipsoids), ellipsoids
+
+
+def through_centres(
+    problem: Problem, samples: Samples, level: IntArray, ellipsoids: Ellipsoids
+) -> MotorFit:
+    """The weighted line through the centres of ellipsoids.
+
+    Parameters
+    ----------
+    problem, samples, level
+        As for :func:`fit_levels`.
+    ellipsoids
+        One a level; their covariance weighs the centres.
+    """
     levels = tuple(
         _level(samples, level == k, ellipsoids, k) for k in range(len(ellipsoids.centres))
     )
@@ -109,7 +109,7 @@ def fit_levels(
     )
     corrected = correction.apply(samples.raw, samples.u)
     along_gravity = np.einsum("ij,ij->i", corrected, samples.down)
-    fit = MotorFit(
+    return MotorFit(
         compass=samples.compass,
         method="levels",
         why=f"the vehicle was turned at {len(levels)} steady levels of {problem.control.kind}",
@@ -129,7 +129,6 @@ def fit_levels(
         u_high=max(lv.u for lv in levels),
         count=len(samples),
     )
-    return fit, ellipsoids
 
 
 def drift_of_centres(time: FloatArray, level: IntArray, wander: Wander) -> FloatArray:

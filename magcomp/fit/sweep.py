@@ -142,13 +142,13 @@ def fit_sweep(problem: Problem, *, lag: float | None = None, drifts: bool = True
         blocks=time_blocks(problem.readings.time, BLOCK_S / 5),
         feasible=lambda p: bool(abs(p[_LAG]) < LAG_MOST_S),
     )
+    samples = problem.sample(Lags(0.0, float(found.parameters[_LAG])))
     covariance = found.covariance.copy()
     if drifts:
-        rows = problem.sample(Lags(0.0, float(found.parameters[_LAG])))
-        fitted = np.column_stack([np.ones(len(rows)), rows.u])
-        drift = covariance_of_drift(rows.time, found.residuals, fitted)
+        fitted = np.column_stack([np.ones(len(samples)), samples.u])
+        drift = covariance_of_drift(samples.time, found.residuals, fitted)
         covariance[:_LAG, :_LAG] += np.kron(drift, np.eye(3))
-    return _answer(problem, found.parameters, covariance, float(np.max(found.noise)))
+    return _answer(problem, samples, found.parameters, covariance, float(np.max(found.noise)))
 
 
 def _nearest_lag(problem: Problem) -> float:
@@ -170,12 +170,15 @@ def _lag_std(problem: Problem, stated: float) -> float:
 
 
 def _answer(
-    problem: Problem, parameters: FloatArray, covariance: FloatArray, noise: float
+    problem: Problem,
+    samples: Samples,
+    parameters: FloatArray,
+    covariance: FloatArray,
+    noise: float,
 ) -> MotorFit:
     present = problem.readings.in_force[-1].correction
     shape, slope = present.soft_iron, parameters[_SLOPE].reshape(-1, 3)
     parts = len(slope)
-    samples = problem.sample(Lags(0.0, float(parameters[_LAG])))
     correction = Correction(present.offset, shape, -shape @ slope.T)
     full = np.zeros((CORRECTION_SIZE + 3 * (parts - 1),) * 2)
     full[:CORRECTION_SIZE, :CORRECTION_SIZE] = np.diag(_unseen_variance(present))

@@ -341,7 +341,7 @@ def posterior(
     Parameters
     ----------
     part_at
-        The model: parameters, shape (SIZE,), to what :func:`weighed` makes of the readings.
+        The model: parameters, shape (SIZE,), to what :func:`reduced` makes of the readings.
     start
         Near the solution, shape (SIZE,).
     prior

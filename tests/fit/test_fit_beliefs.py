@@ -7,16 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from synthetic import (
-    EXACT,
-    INTERFERENCE,
-    NOTHING,
-    Flown,
-    drifting,
-    earth,
-    problem_of,
-    stored,
-)
+from synthetic import EXACT, INTERFERENCE, NOTHING, Flown, drifting, earth, problem_of, stored
+from truth import Truth, heading_error_deg
 
 from magcomp.fit import beliefs, fit
 from magcomp.fit.flight import (
@@ -29,10 +21,8 @@ from magcomp.fit.flight import (
 )
 from magcomp.fit.robust import Prior
 from magcomp.fit.wander import Posterior, Reduced, Rows, Wander, reduced
-from magcomp.geometry import body_from_earth, heading, wrap_angle
 from magcomp.judge import judge
-from magcomp.judge.heading_error import attitudes
-from magcomp.model import OFFSET, SLOW_S, Correction, FloatArray, Series, running_mean
+from magcomp.model import OFFSET, SLOW_S, FloatArray, Series, running_mean
 
 CALIBRATED = None
 DRIFTING = Wander(drift_mgauss=3.0)
@@ -144,14 +134,6 @@ def off_by(mgauss: float, share: float, seed: int) -> Flown:
     return Flown(seed=seed, seconds=150.0, noise=1.5, in_force=in_force)
 
 
-def heading_error_deg(made: Flown, correction: Correction, amperes: float) -> float:
-    roll, pitch, yaw = attitudes()
-    true, drawn = body_from_earth(roll, pitch, yaw) @ earth().ned, np.full(len(yaw), amperes)
-    corrected = correction.apply(made.raw_of(true, drawn), drawn)
-    wrong = wrap_angle(heading(corrected, roll, pitch) - heading(true, roll, pitch))
-    return float(np.degrees(np.abs(wrong).max()))
-
-
 @pytest.mark.parametrize("seed", [1, 2, 3, 4])
 @pytest.mark.parametrize(("mgauss", "share"), [(4.0, 0.005), (12.0, 0.015)])
 def test_a_calibration_that_is_hardly_off_is_not_held_where_the_data_contradict_it(
@@ -163,8 +145,12 @@ def test_a_calibration_that_is_hardly_off_is_not_held_where_the_data_contradict_
     found, verdict = judge(problem, fit(problem, "flight"))
     flown_at = [row for row in verdict.heading_error if row.u <= found.u_high]
     assert len(flown_at) > 2
+    exact = Truth(
+        INTERFERENCE, {1: EXACT.offset}, {1: EXACT.soft_iron}, earth().ned, earth().declination
+    )
+    written = {"COMPASS_MOTCT": 2.0, **stored(found.correction)}
     for row in flown_at:
-        assert heading_error_deg(made, found.correction, row.u) <= row.p95
+        assert heading_error_deg(exact, written, 1, row.u, row.u) <= row.p95
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])

@@ -11,16 +11,9 @@ from synthetic import EXACT, INTERFERENCE, Flown, Turned, drifting, problem_of
 
 from magcomp.errors import FitRejectedError
 from magcomp.fit import fit
-from magcomp.fit.levels import drift_of_centres, fit_levels, usable_levels
+from magcomp.fit.levels import drift_of_centres, fit_levels, through_centres, usable_levels
 from magcomp.fit.wander import Wander
-from magcomp.model import (
-    MOTOR,
-    OFFSET,
-    Lags,
-    MotorFit,
-    Series,
-    pack,
-)
+from magcomp.model import MOTOR, OFFSET, Lags, MotorFit, Series, pack
 
 UNCALIBRATED = {"COMPASS_MOTCT": 0.0}
 RIG = {"in_force": UNCALIBRATED, "noise": 1.5}
@@ -173,9 +166,10 @@ def test_without_drift_the_covariance_of_centres_stays_that_of_the_noise():
     still, moved = Wander(drift_mgauss=0.2), Wander(drift_mgauss=3.0)
     problem = Turned(seed=1, **RIG).problem()
     rows, level = usable_levels(problem)
+    ellipsoids = fit_levels(problem, rows, level)[1]
+    drifts = (drift_of_centres(rows.time, level, each) for each in (still, moved))
     least, more = (
-        fit_levels(problem, rows, level, drift=drift_of_centres(rows.time, level, each))[0]
-        for each in (still, moved)
+        through_centres(problem, rows, level, ellipsoids.drifting(drift)) for drift in drifts
     )
     assert np.allclose(pack(least.correction), pack(more.correction), rtol=1e-2, atol=0.5)
     of_offset = [np.diag(each.covariance)[OFFSET].mean() for each in (least, more)]
